@@ -1,0 +1,71 @@
+"""What is declared of a sensor: geometry, noise, timing, detection. SI and radians."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from boresight.types.enums import N_COMPONENTS, Axes, SensorKind
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """Origin of the world's east/north/up axes on the WGS84 ellipsoid (rad, rad, m)."""
+
+    latitude: float
+    longitude: float
+    height: float
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """How a sensor sits on its platform: yaw, pitch, roll (rad) turn body into mount axes; lever arm in FRD metres."""
+
+    yaw: float = 0.0
+    pitch: float = 0.0
+    roll: float = 0.0
+    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """Where a sensor can see, in its own axes: range (m), azimuth and elevation (rad), each (low, high).
+
+    Azimuth runs clockwise from `azimuth[0]` to `azimuth[1]`; an interval of 2π or more is all round, and
+    low > high passes through south.
+    """
+
+    range: tuple[float, float] = (0.0, math.inf)
+    azimuth: tuple[float, float] = (-math.pi, math.pi)
+    elevation: tuple[float, float] = (-math.pi / 2, math.pi / 2)
+
+
+def _no_sigma() -> FloatArray:
+    return np.full(N_COMPONENTS, np.nan)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sensor:
+    """One sensor of a recording.
+
+    `sigma` (7,) holds the standard deviation of every `Component` that the sensor may measure (m, rad, m/s), NaN
+    where it never measures one. `latency` (s): validity = stamp - latency. `period` (s) is None where unknown.
+    `p_detection` holds within coverage; `clutter_per_scan` is the mean number of false detections of a look.
+    """
+
+    id: str
+    kind: SensorKind
+    platform: str | None = None
+    axes: Axes = Axes.SITE_ENU
+    mount: Mount = Mount()
+    sigma: FloatArray = field(default_factory=_no_sigma)
+    latency: float = 0.0
+    period: float | None = None
+    p_detection: float = 0.9
+    clutter_per_scan: float = 1.0
+    coverage: Coverage = Coverage()
