@@ -10,8 +10,8 @@ import boresight
 ROOT = Path(boresight.__file__).parent
 LEVELS = [
     {"errors", "_version"},
-    {"kernels"},
     {"types"},
+    {"kernels"},
     {"frames"},
     {"models"},
     {"filters", "association"},

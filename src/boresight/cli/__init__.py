@@ -17,7 +17,7 @@ app = App(
 )
 
 # One line a command: module:function, and the sentence that `boresight --help` shows.
-COMMANDS = {}
+COMMANDS: dict[str, tuple[str, str]] = {}
 
 for _name, (_target, _help) in COMMANDS.items():
     app.command(_target, name=_name, help=_help)
