@@ -1,0 +1,75 @@
+"""The extended Kalman filter: predict to any time, update with one report of any sensor."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from boresight.errors import UserError
+from boresight.kernels.gaussian import joseph_update, sandwich
+from boresight.models import check
+from boresight.models.base import KernelSensor
+from boresight.models.motion.base import KernelMotion
+from boresight.models.protocols import MeasurementModel, MotionModel
+from boresight.types.sensor import FloatArray
+from boresight.types.state import GaussianState, UpdateInfo
+
+
+def init(t: float, x: FloatArray, P: FloatArray) -> GaussianState:
+    """Return the state at `t` (s) with mean `x` (n,) and covariance `P` (n, n).
+
+    Raises UserError where they are not finite, do not fit, or `P` is not symmetric positive definite.
+    """
+    mean = np.array(x, dtype=float)
+    if mean.ndim != 1 or not np.all(np.isfinite(mean)) or not math.isfinite(t):
+        raise UserError("the prior must be a finite time and a finite vector")
+    return GaussianState(float(t), mean, check.covariance("the prior covariance", P, len(mean)))
+
+
+def predict(state: GaussianState, motion: MotionModel, t: float) -> GaussianState:
+    """Move a state to time `t` (s): x⁺ = f(x), P⁺ = FPFᵀ + Q(dt).
+
+    Raises UserError where `t` is not finite or before the state's time: late reports are for `filters.late`.
+    """
+    dt = t - state.t
+    if not dt >= 0.0 or not math.isfinite(dt):
+        raise UserError(f"cannot predict from t = {state.t!r} to t = {t!r}: time must not run backwards")
+    if isinstance(motion, KernelMotion):
+        x, F, Q = motion.move(state.x, dt)
+    else:
+        x, F, Q = motion.transition(state.x, dt), motion.F(state.x, dt), motion.Q(state.x, dt)
+    P = sandwich(np.ascontiguousarray(F, dtype=float), state.P, np.ascontiguousarray(Q, dtype=float))
+    return GaussianState(float(t), x, P)
+
+
+def update(
+    state: GaussianState,
+    sensor: MeasurementModel,
+    z: FloatArray,
+    *,
+    n_estimated: int | None = None,
+) -> tuple[GaussianState, UpdateInfo]:
+    """Condition a state on one report `z` (m,) of a sensor, in Joseph form; NaN components are left out.
+
+    A sensor on a moving platform is given where it was at the report's time: `update(state, radar.at(pose), z)`.
+    States from `n_estimated` on are considered (Schmidt): they widen the covariance but are not estimated.
+    Raises UserError where the report holds no component that can be used, or S is not positive definite.
+    """
+    if isinstance(sensor, KernelSensor):
+        y, H = sensor.linearise(z, state.x)
+    else:
+        y, H = sensor.innovation(z, state.x), sensor.H(state.x)
+    R = sensor.R(state.x)
+    seen = np.isfinite(y)
+    if not seen.all():
+        if not seen.any():
+            raise UserError("the measurement has no component that can be used: nothing measured, or zero range")
+        y, H, R = y[seen], H[seen], R[np.ix_(seen, seen)]
+    n = len(state.x) if n_estimated is None else n_estimated
+    x, P, S, nis, log_likelihood = joseph_update(
+        state.x, state.P, y, np.ascontiguousarray(H), np.ascontiguousarray(R), n
+    )
+    if math.isnan(nis):
+        raise UserError("the innovation covariance is not positive definite: check the prior and the sensor's noise")
+    return GaussianState(state.t, x, P), UpdateInfo(y, S, nis, log_likelihood)

@@ -1,0 +1,127 @@
+"""Moving and conditioning a Gaussian: small dense matrices, symmetric by construction."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from boresight.types.sensor import FloatArray
+
+
+@njit(cache=True)
+def cholesky(A: FloatArray, L: FloatArray) -> bool:
+    """Fill `L` with the lower Cholesky factor of symmetric `A` (n, n); False where it is not positive definite."""
+    n = A.shape[0]
+    for j in range(n):
+        for i in range(j):
+            L[i, j] = 0.0
+        s = A[j, j]
+        for k in range(j):
+            s -= L[j, k] * L[j, k]
+        if not s > 0.0:
+            return False
+        d = math.sqrt(s)
+        L[j, j] = d
+        for i in range(j + 1, n):
+            s = A[i, j]
+            for k in range(j):
+                s -= L[i, k] * L[j, k]
+            L[i, j] = s / d
+    return True
+
+
+@njit(cache=True)
+def solve_lower(L: FloatArray, b: FloatArray) -> None:
+    """Overwrite `b` (n,) with L⁻¹b."""
+    for i in range(L.shape[0]):
+        s = b[i]
+        for k in range(i):
+            s -= L[i, k] * b[k]
+        b[i] = s / L[i, i]
+
+
+@njit(cache=True)
+def solve_upper(L: FloatArray, b: FloatArray) -> None:
+    """Overwrite `b` (n,) with L⁻ᵀb."""
+    n = L.shape[0]
+    for i in range(n - 1, -1, -1):
+        s = b[i]
+        for k in range(i + 1, n):
+            s -= L[k, i] * b[k]
+        b[i] = s / L[i, i]
+
+
+@njit(cache=True)
+def sandwich(A: FloatArray, P: FloatArray, Q: FloatArray) -> FloatArray:
+    """Return A P Aᵀ + Q for symmetric P and Q, exactly symmetric; A is (m, n)."""
+    m, n = A.shape
+    AP = np.empty((m, n))
+    out = np.empty((m, m))
+    for i in range(m):
+        for j in range(n):
+            s = 0.0
+            for k in range(n):
+                s += A[i, k] * P[k, j]
+            AP[i, j] = s
+    for i in range(m):
+        for j in range(i + 1):
+            s = 0.5 * (Q[i, j] + Q[j, i])
+            for k in range(n):
+                s += AP[i, k] * A[j, k]
+            out[i, j] = s
+            out[j, i] = s
+    return out
+
+
+@njit(cache=True)
+def joseph_update(
+    x: FloatArray, P: FloatArray, y: FloatArray, H: FloatArray, R: FloatArray, n_estimated: int
+) -> tuple[FloatArray, FloatArray, FloatArray, float, float]:
+    """Condition the Gaussian (x, P) on an innovation y (m,) = z - h(x) with Jacobian H (m, n) and covariance R (m, m).
+
+    S = HPHᵀ + R, K = PHᵀS⁻¹, x⁺ = x + Ky, P⁺ = (I - KH)P(I - KH)ᵀ + KRKᵀ, exactly symmetric. The rows of K from
+    `n_estimated` on are zero: those states are considered (Schmidt), not estimated; n for an ordinary update.
+
+    Returns x⁺, P⁺, S, the normalised innovation squared yᵀS⁻¹y and log N(y; 0, S). Where S is not positive definite
+    nothing is changed and the last two are NaN.
+    """
+    n = x.shape[0]
+    m = y.shape[0]
+    S = sandwich(H, P, R)
+    L = np.empty((m, m))
+    if not cholesky(S, L):
+        return x.copy(), P.copy(), S, np.nan, np.nan
+    K = np.zeros((n, m))
+    column = np.empty(m)
+    for i in range(n_estimated):
+        for a in range(m):
+            s = 0.0
+            for k in range(n):
+                s += P[i, k] * H[a, k]
+            column[a] = s
+        solve_lower(L, column)
+        solve_upper(L, column)
+        for a in range(m):
+            K[i, a] = column[a]
+    log_det = 0.0
+    for a in range(m):
+        column[a] = y[a]
+        log_det += 2.0 * math.log(L[a, a])
+    solve_lower(L, column)
+    nis = 0.0
+    for a in range(m):
+        nis += column[a] * column[a]
+    x_new = x.copy()
+    A = np.empty((n, n))
+    for i in range(n):
+        for a in range(m):
+            x_new[i] += K[i, a] * y[a]
+        for j in range(n):
+            s = 1.0 if i == j else 0.0
+            for a in range(m):
+                s -= K[i, a] * H[a, j]
+            A[i, j] = s
+    P_new = sandwich(A, P, sandwich(K, R, np.zeros((n, n))))
+    return x_new, P_new, S, nis, -0.5 * (nis + log_det + m * math.log(2.0 * math.pi))
