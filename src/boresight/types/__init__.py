@@ -2,15 +2,20 @@
 
 from boresight.types.enums import N_COMPONENTS, Axes, Component, Fate, SensorKind, TrackStatus
 from boresight.types.recording import Detections, Ignore, PlatformTrack, Recording, Truth
+from boresight.types.results import FATES, NO_TRACK, STATUSES, DecisionRows, Results, TrackRows, no_tracks
 from boresight.types.scan import Scan
 from boresight.types.sensor import Coverage, FloatArray, Mount, Sensor, Site
 from boresight.types.state import GaussianState, Pose, UpdateInfo
 
 __all__ = [
+    "FATES",
+    "NO_TRACK",
     "N_COMPONENTS",
+    "STATUSES",
     "Axes",
     "Component",
     "Coverage",
+    "DecisionRows",
     "Detections",
     "Fate",
     "FloatArray",
@@ -20,11 +25,14 @@ __all__ = [
     "PlatformTrack",
     "Pose",
     "Recording",
+    "Results",
     "Scan",
     "Sensor",
     "SensorKind",
     "Site",
+    "TrackRows",
     "TrackStatus",
     "Truth",
     "UpdateInfo",
+    "no_tracks",
 ]

@@ -1,0 +1,231 @@
+"""recording.toml: what is declared of the site and the sensors, to and from `types`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from boresight.errors import UserError, did_you_mean
+from boresight.io.toml import TableModel, convert, read_toml, write_toml
+from boresight.types import Axes, Component, Coverage, Mount, Sensor, SensorKind, Site
+
+DEG = math.pi / 180.0
+SIGMA_KEYS: dict[str, tuple[tuple[Component, ...], float]] = {
+    "sigma_range_m": ((Component.RANGE,), 1.0),
+    "sigma_azimuth_deg": ((Component.AZIMUTH,), DEG),
+    "sigma_elevation_deg": ((Component.ELEVATION,), DEG),
+    "sigma_range_rate_m_s": ((Component.RANGE_RATE,), 1.0),
+    "sigma_position_m": ((Component.EAST, Component.NORTH, Component.UP), 1.0),
+}
+
+
+class SiteTable(TableModel, frozen=True):
+    """`[site]`."""
+
+    latitude_deg: float
+    longitude_deg: float
+    height_m: float = 0.0
+
+
+class MountTable(TableModel, frozen=True):
+    """`mount = {…}` of a sensor."""
+
+    yaw_deg: float = 0.0
+    pitch_deg: float = 0.0
+    roll_deg: float = 0.0
+    lever_arm_frd_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class CoverageTable(TableModel, frozen=True):
+    """`coverage = {…}` of a sensor."""
+
+    range_m: tuple[float, float] = (0.0, math.inf)
+    azimuth_deg: tuple[float, float] = (-180.0, 180.0)
+    elevation_deg: tuple[float, float] = (-90.0, 90.0)
+
+
+class SensorTable(TableModel, frozen=True):
+    """One `[[sensor]]`."""
+
+    id: str
+    kind: str
+    platform: str | None = None
+    axes: str = "site_enu"
+    mount: MountTable = MountTable()
+    sigma_range_m: float | None = None
+    sigma_azimuth_deg: float | None = None
+    sigma_elevation_deg: float | None = None
+    sigma_range_rate_m_s: float | None = None
+    sigma_position_m: float | None = None
+    latency_s: float = 0.0
+    period_s: float | None = None
+    p_detection: float = 0.9
+    clutter_per_scan: float = 1.0
+    coverage: CoverageTable = CoverageTable()
+
+
+class RecordingTable(TableModel, frozen=True):
+    """The whole of recording.toml."""
+
+    site: SiteTable
+    sensor: tuple[SensorTable, ...]
+    format: int = 1
+    name: str = ""
+    dimensions: int = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Declaration:
+    """What recording.toml says, in SI and radians."""
+
+    name: str
+    dimensions: int
+    site: Site
+    sensors: tuple[Sensor, ...]
+
+
+def read_declaration(path: Path | str) -> Declaration:
+    """Read and check a recording.toml; raises UserError that names file and key."""
+    where = str(path)
+    table = convert(read_toml(path), RecordingTable, where)
+    if table.format != 1:
+        raise UserError(f"{where}: format = {table.format}; this version reads format = 1")
+    if table.dimensions not in (2, 3):
+        raise UserError(f"{where}: dimensions = {table.dimensions}; give 2 or 3")
+    if not table.sensor:
+        raise UserError(f"{where}: no [[sensor]] table; declare at least one sensor")
+    sensors = tuple(sensor_of(s, where) for s in table.sensor)
+    ids = [s.id for s in sensors]
+    for i in ids:
+        if ids.count(i) > 1:
+            raise UserError(f"{where}: sensor id '{i}' stands twice; give each sensor its own id")
+    return Declaration(table.name, table.dimensions, site_of(table.site, where), sensors)
+
+
+def site_of(table: SiteTable, where: str) -> Site:
+    """Return the Site of a `[site]` table."""
+    for key, limit in (("latitude_deg", 90.0), ("longitude_deg", 360.0), ("height_m", math.inf)):
+        value = getattr(table, key)
+        if not (math.isfinite(value) and abs(value) <= limit):
+            raise UserError(f"{where}: site.{key} = {value} is out of range")
+    return Site(table.latitude_deg * DEG, table.longitude_deg * DEG, table.height_m)
+
+
+def sensor_of(table: SensorTable, where: str) -> Sensor:
+    """Return the Sensor of a `[[sensor]]` table."""
+    if not table.id:
+        raise UserError(f"{where}: a [[sensor]] has an empty id")
+    at = f"{where}: sensor '{table.id}'"
+    sigma = np.full(len(Component), np.nan)
+    for key, (components, unit) in SIGMA_KEYS.items():
+        value = getattr(table, key)
+        if value is not None:
+            _need(at, key, value, math.isfinite(value) and value > 0, "a standard deviation above zero")
+            sigma[list(components)] = value * unit
+    sigma.flags.writeable = False
+    _need(at, "latency_s", table.latency_s, math.isfinite(table.latency_s), "a finite number")
+    if table.period_s is not None:
+        _need(at, "period_s", table.period_s, 0 < table.period_s < math.inf, "a time above zero")
+    _need(at, "p_detection", table.p_detection, 0 < table.p_detection <= 1, "a probability in (0, 1]")
+    clutter = table.clutter_per_scan
+    _need(at, "clutter_per_scan", clutter, 0 <= clutter < math.inf, "a mean number of zero or more")
+    return Sensor(
+        id=table.id,
+        kind=SensorKind(_word(at, "kind", table.kind, list(SensorKind))),
+        platform=table.platform,
+        axes=Axes(_word(at, "axes", table.axes, list(Axes))),
+        mount=mount_of(table.mount, at),
+        sigma=sigma,
+        latency=table.latency_s,
+        period=table.period_s,
+        p_detection=table.p_detection,
+        clutter_per_scan=clutter,
+        coverage=coverage_of(table.coverage, at),
+    )
+
+
+def mount_of(table: MountTable, at: str) -> Mount:
+    """Return the Mount of a `mount` table."""
+    angles = (table.yaw_deg, table.pitch_deg, table.roll_deg)
+    if not all(math.isfinite(v) for v in (*angles, *table.lever_arm_frd_m)):
+        raise UserError(f"{at}: mount holds a number that is not finite")
+    return Mount(table.yaw_deg * DEG, table.pitch_deg * DEG, table.roll_deg * DEG, table.lever_arm_frd_m)
+
+
+def coverage_of(table: CoverageTable, at: str) -> Coverage:
+    """Return the Coverage of a `coverage` table."""
+    for key in ("range_m", "elevation_deg"):
+        low, high = getattr(table, key)
+        _need(at, f"coverage.{key}", [low, high], low < high and math.isfinite(low), "[low, high] with low < high")
+    _need(at, "coverage.range_m", table.range_m[0], table.range_m[0] >= 0, "a range of zero or more")
+    low, high = table.azimuth_deg
+    good = math.isfinite(low) and math.isfinite(high) and low != high
+    _need(at, "coverage.azimuth_deg", [low, high], good, "two different finite angles")
+    low, high = table.elevation_deg
+    return Coverage(
+        table.range_m,
+        (table.azimuth_deg[0] * DEG, table.azimuth_deg[1] * DEG),
+        (max(low, -90.0) * DEG, min(high, 90.0) * DEG),
+    )
+
+
+def write_declaration(declaration: Declaration) -> str:
+    """Return the text of recording.toml."""
+    site = declaration.site
+    top: dict[str, Any] = {"format": 1, "name": declaration.name, "dimensions": declaration.dimensions}
+    top["site"] = {
+        "latitude_deg": _deg(site.latitude),
+        "longitude_deg": _deg(site.longitude),
+        "height_m": site.height,
+    }
+    top["sensor"] = [_sensor_table(s) for s in declaration.sensors]
+    return write_toml(top)
+
+
+def _sensor_table(sensor: Sensor) -> dict[str, Any]:
+    table: dict[str, Any] = {"id": sensor.id, "kind": str(sensor.kind)}
+    if sensor.platform is not None:
+        table["platform"] = sensor.platform
+    mount, cover = sensor.mount, sensor.coverage
+    table["axes"] = str(sensor.axes)
+    table["mount"] = {
+        "yaw_deg": _deg(mount.yaw),
+        "pitch_deg": _deg(mount.pitch),
+        "roll_deg": _deg(mount.roll),
+        "lever_arm_frd_m": list(mount.lever_arm),
+    }
+    for key, (components, unit) in SIGMA_KEYS.items():
+        value = float(sensor.sigma[components[0]])
+        if not math.isnan(value):
+            table[key] = value if unit == 1.0 else _deg(value)
+    table["latency_s"] = sensor.latency
+    if sensor.period is not None:
+        table["period_s"] = sensor.period
+    table |= {"p_detection": sensor.p_detection, "clutter_per_scan": sensor.clutter_per_scan}
+    table["coverage"] = {
+        "range_m": list(cover.range),
+        "azimuth_deg": [_deg(a) for a in cover.azimuth],
+        "elevation_deg": [_deg(a) for a in cover.elevation],
+    }
+    return table
+
+
+def _deg(angle: float) -> float:
+    """Radians to degrees, rounded so that a number a person wrote comes back as written."""
+    return float(f"{angle / DEG:.14g}")
+
+
+def _need(at: str, key: str, value: Any, good: bool, wanted: str) -> None:
+    if not good:
+        raise UserError(f"{at}: {key} = {value}; give {wanted}")
+
+
+def _word(at: str, key: str, word: str, known: list[str]) -> str:
+    if word not in known:
+        choices = ", ".join(known)
+        raise UserError(f"{at}: {key} = '{word}' is not known{did_you_mean(word, known)}; give one of {choices}")
+    return word

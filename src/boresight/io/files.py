@@ -1,0 +1,114 @@
+"""Files that are whole or not there: atomic output, and input errors that name the file."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from boresight.errors import UserError
+
+OURS = ("recording.toml", "summary.json")  # a folder that holds one of these was written by us and may be replaced
+
+
+def reason(error: OSError) -> str:
+    """Return the operating system's words for an error, without its number."""
+    return (error.strerror or str(error)).lower()
+
+
+def read_bytes(path: Path) -> bytes:
+    """Read a whole file; raises UserError when it is missing, empty or cannot be read."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise UserError(f"{path}: no such file") from None
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({reason(error)})") from None
+    if not data:
+        raise UserError(f"{path}: the file is empty")
+    return data
+
+
+def read_text(path: Path) -> str:
+    """Read a whole UTF-8 file; raises UserError when it is missing, empty or binary."""
+    try:
+        text = read_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path}: not a text file (byte {error.start} is not UTF-8)") from None
+    if "\0" in text:
+        raise UserError(f"{path}: not a text file (it holds zero bytes)")
+    if not text.strip():
+        raise UserError(f"{path}: the file is empty")
+    return text
+
+
+def check_output(path: Path, force: bool) -> None:
+    """Raise UserError when `path` may not become an output folder: it exists without `force`, or is not ours."""
+    if path.is_dir():
+        if not force:
+            raise UserError(f"{path}: the output folder exists; give --force to replace it")
+        inside = {p.name for p in path.iterdir()}
+        if inside and not inside & set(OURS):
+            raise UserError(f"{path}: holds files that boresight did not write; choose another output folder")
+    elif path.exists() or path.is_symlink():
+        raise UserError(f"{path}: exists and is not a folder; choose another output folder")
+    try:
+        path.absolute().parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"{path}: the output folder cannot be made ({reason(error)})") from None
+
+
+@contextlib.contextmanager
+def output_folder(path: Path | str, force: bool = False) -> Iterator[Path]:
+    """Give a temporary folder beside `path` that takes its name when the block ends well, and vanishes when not.
+
+    Raises UserError when `path` exists and `force` is not given, or cannot be written.
+    """
+    path = Path(path)
+    check_output(path, force)
+    parent = path.absolute().parent
+    try:
+        work = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=parent))
+    except OSError as error:
+        raise UserError(f"{path}: the output folder cannot be written ({reason(error)})") from None
+    try:
+        new = work / "new"
+        new.mkdir()
+        yield new
+        if path.exists():
+            path.rename(work / "old")
+        new.rename(path)
+    except OSError as error:
+        raise UserError(f"{path}: writing failed ({reason(error)})") from None
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def write_text(path: Path | str, text: str, force: bool = False) -> None:
+    """Write one UTF-8 file at once; raises UserError when it exists and `force` is not given, or cannot be written."""
+    path = Path(path)
+    if path.exists() and not force:
+        raise UserError(f"{path}: the file exists; give --force to replace it")
+    try:
+        path.absolute().parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.absolute().parent)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written ({reason(error)})") from None
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
+            file.write(text)
+        Path(name).chmod(0o666 & ~_umask())
+        Path(name).replace(path)
+    except OSError as error:
+        raise UserError(f"{path}: writing failed ({reason(error)})") from None
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
