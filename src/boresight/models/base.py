@@ -129,6 +129,5 @@ def describe(
     context[observation.DIMENSIONS] = dimensions
     context[observation.TANGENT] = tangent
     context[observation.POSITION : observation.NOISE] = _place(sensor.pose)
-    context.setflags(write=False)
     object.__setattr__(sensor, "components", components)
     object.__setattr__(sensor, "context", context)

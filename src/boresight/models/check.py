@@ -21,7 +21,7 @@ def spatial(dimensions: int) -> None:
 
 
 def covariance(name: str, P: FloatArray, size: int) -> FloatArray:
-    """Return `P` as a read-only, exactly symmetric (size, size) array; raises UserError unless it is a covariance."""
+    """Return a copy of `P`, exactly symmetric (size, size) array; raises UserError unless it is a covariance."""
     out: FloatArray = np.array(P, dtype=float)
     if out.shape != (size, size):
         raise UserError(f"{name} must have shape ({size}, {size}), not {out.shape}")
@@ -34,5 +34,4 @@ def covariance(name: str, P: FloatArray, size: int) -> FloatArray:
         np.linalg.cholesky(out)
     except np.linalg.LinAlgError:
         raise UserError(f"{name} is not positive definite") from None
-    out.setflags(write=False)
     return out
