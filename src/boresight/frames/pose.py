@@ -1,0 +1,237 @@
+"""A platform's pose between its navigation stamps, and a sensor's on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from boresight.errors import UserError
+from boresight.frames.local import ENU_FROM_NED
+from boresight.kernels import pose as kernel
+from boresight.kernels import rotation, rotations
+from boresight.types import Axes, PlatformTrack, Pose, Sensor, Site
+from boresight.types.sensor import FloatArray
+
+SLOPE_WINDOW = 1.0  # s to either side over which a missing velocity is fitted
+_NORTH_LEVEL: FloatArray = ENU_FROM_NED.copy()  # heading north, level: FRD is NED
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseTrack:
+    """Stamped navigation data, ready to be asked for any time: build it with `pose_track`.
+
+    Attributes:
+        id: the platform.
+        t: (n,) stamps of positions (s); `position`, `velocity` (n, 3) in the site's ENU (m, m/s).
+        hermite: (n - 1,) whether both ends of a segment have a measured velocity.
+        t_attitude: (m,) stamps of attitudes (s), empty if there are none; `quaternion` (m, 4) of enu_from_body;
+            `steps` (m - 1, 3) the turn from each to the next (rad, body axes).
+        max_extrapolation: how far before the first and after the last stamp an answer is given (s).
+        max_gap: the longest time between stamps over which an answer is given (s).
+        site: set if local level turns with the platform's place on the ellipsoid; None for a flat world.
+    """
+
+    id: str
+    t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    hermite: NDArray[np.bool_]
+    t_attitude: FloatArray
+    quaternion: FloatArray
+    steps: FloatArray
+    max_extrapolation: float
+    max_gap: float
+    site: Site | None
+
+    @property
+    def has_attitude(self) -> bool:
+        """Whether any stamp carries an attitude."""
+        return len(self.t_attitude) > 0
+
+    def usable(self, t: ArrayLike, attitude: bool = False) -> NDArray[np.bool_]:
+        """Return (n,) whether `at` answers: no long gap and not too far beyond the ends (with `attitude`, in both)."""
+        times = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        ok = _covered(self.t, times, self.max_gap, self.max_extrapolation)
+        if attitude:
+            ok &= _covered(self.t_attitude, times, self.max_gap, self.max_extrapolation)
+        return ok
+
+    def at(self, t: ArrayLike) -> Pose:
+        """Return the pose at `t` (n,) or a scalar (s): position (…, 3), velocity (…, 3), enu_from_body (…, 3, 3).
+
+        Positions by cubic Hermite where both ends carry a velocity, else linear; attitude by slerp. Beyond the ends
+        velocity and turn rate go on. With no attitude at all the platform heads north, level. Raises UserError
+        where `usable` is false.
+        """
+        times = np.asarray(t, dtype=np.float64)
+        flat = np.ascontiguousarray(times.reshape(-1))
+        position, velocity = self._position(flat)
+        R, _ = self._attitude(flat)
+        if times.ndim == 0:
+            return Pose(times, position[0], velocity[0], R[0])
+        return Pose(times, position, velocity, R)
+
+    def body_rate(self, t: ArrayLike) -> FloatArray:
+        """Return the turn rate (n, 3) at `t` (n,) in body axes (rad/s): constant between attitude stamps."""
+        return self._attitude(np.atleast_1d(np.asarray(t, dtype=np.float64)))[1]
+
+    def _position(self, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        self._check(self.t, t, "position")
+        out: tuple[FloatArray, FloatArray] = kernel.interpolate_position(
+            self.t, self.position, self.velocity, self.hermite, t
+        )
+        return out
+
+    def _attitude(self, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        if not self.has_attitude:
+            return np.broadcast_to(_NORTH_LEVEL, (len(t), 3, 3)).copy(), np.zeros((len(t), 3))
+        self._check(self.t_attitude, t, "attitude")
+        out: tuple[FloatArray, FloatArray] = kernel.interpolate_attitude(
+            self.t_attitude, self.quaternion, self.steps, t
+        )
+        return out
+
+    def _check(self, nodes: FloatArray, t: FloatArray, what: str) -> None:
+        row, gap = kernel.first_uncovered(nodes, t, self.max_gap, self.max_extrapolation)
+        if row < 0:
+            return
+        when = f"platform '{self.id}': {what} at t = {t[row]:.6g} s"
+        if gap > 0.0:
+            raise UserError(f"{when} lies in a gap of {gap:.3g} s without navigation; the limit is {self.max_gap:g} s")
+        raise UserError(
+            f"{when} is more than {self.max_extrapolation:g} s outside the navigation data "
+            f"({nodes[0]:.6g} … {nodes[-1]:.6g} s)"
+        )
+
+
+def pose_track(
+    platform: PlatformTrack,
+    site: Site | None = None,
+    *,
+    max_extrapolation: float = 2.0,
+    max_gap: float = 10.0,
+) -> PoseTrack:
+    """Make a `PoseTrack` of stamped navigation data (`PlatformTrack`, site ENU, NaN where not given).
+
+    Where velocities are missing they are the slope of a least-squares line over the stamps within ±1 s (at least
+    the neighbours). With `site`, attitude and north-aligned axes refer to local level *at the platform*, which turns
+    by 0.009° per kilometre from the site's; without, the world is flat. Raises UserError for an empty track, stamps
+    that do not ascend, or a platform with no finite position.
+    """
+    have = np.isfinite(platform.position).all(axis=1) & np.isfinite(platform.t)
+    if not have.any():
+        raise UserError(f"platform '{platform.id}': no row has a position")
+    stamps = platform.t[np.isfinite(platform.t)]
+    backwards = np.flatnonzero(np.less_equal(stamps[1:], stamps[:-1]))
+    if len(backwards):
+        before, after = stamps[backwards[0]], stamps[backwards[0] + 1]
+        raise UserError(f"platform '{platform.id}': times must ascend ({after:.6f} s stands after {before:.6f} s)")
+    t = np.ascontiguousarray(platform.t[have])
+    position = np.ascontiguousarray(platform.position[have])
+    measured: NDArray[np.bool_] = np.isfinite(platform.velocity[have]).all(axis=1)
+    velocity = platform.velocity[have].copy()
+    if not measured.all():
+        velocity[~measured] = kernel.slopes(t, position, SLOPE_WINDOW)[~measured]
+    turned = np.isfinite(platform.ypr).all(axis=1) & np.isfinite(platform.t)
+    t_attitude = np.ascontiguousarray(platform.t[turned])
+    quaternion = _attitudes(platform.ypr[turned], t_attitude, t, position, velocity, site)
+    return PoseTrack(
+        platform.id, t, position, velocity, measured[1:] & measured[:-1], t_attitude, quaternion,
+        rotations.steps_between(quaternion), max_extrapolation, max_gap, site,
+    )  # fmt: skip
+
+
+def sensor_pose(sensor: Sensor, track: PoseTrack | None, t: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return position (n, 3), velocity (n, 3) in world ENU and `enu_from_sensor` (n, 3, 3) of a sensor at `t` (n,).
+
+    The columns of `enu_from_sensor` are the sensor's east/north/up-like axes in ENU, as `kernels.measurement` takes
+    them: for `site_enu` and `platform_enu` east, north, up; for `body` and `mount` right, forward and minus down.
+    The lever arm (FRD) turns with the platform and adds rate × arm to the velocity.
+
+    - `site_enu`: fixed at the site's origin; no lever arm.
+    - `platform_enu`: at the platform, north-aligned.
+    - `body`, `mount`: on the platform's body, turned by `mount` for the latter. Without a platform the body is the
+      site's north/east/down.
+
+    Raises UserError for a platform sensor without a track, for one that needs attitude where there is none, and for
+    times that the track does not cover.
+    """
+    times = np.ascontiguousarray(np.atleast_1d(np.asarray(t, dtype=np.float64)))
+    n = len(times)
+    if sensor.axes == Axes.SITE_ENU:
+        return np.zeros((n, 3)), np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)).copy()
+    arm = np.array(sensor.mount.lever_arm, dtype=np.float64)
+    if track is None:
+        position, velocity, R, rate = _fixed(sensor, n)
+    else:
+        position, velocity = track._position(times)
+        needs_attitude = sensor.axes != Axes.PLATFORM_ENU or bool(arm.any())
+        if needs_attitude and not track.has_attitude:
+            why = f'axes = "{sensor.axes}"' if sensor.axes != Axes.PLATFORM_ENU else "a lever arm"
+            raise UserError(
+                f"sensor '{sensor.id}' has {why} and needs the attitude of platform '{track.id}', which has none"
+            )
+        if not needs_attitude:
+            return position, velocity, _north_aligned(track, position)
+        R, rate = track._attitude(times)
+    if sensor.axes == Axes.PLATFORM_ENU and track is not None:
+        axes = _north_aligned(track, position)
+    else:
+        axes = kernel.sensor_axes(R, _body_from_mount(sensor))
+    if arm.any():
+        kernel.add_lever_arm(position, velocity, R, rate, arm)
+    return position, velocity, axes
+
+
+def _fixed(sensor: Sensor, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    if sensor.platform is not None or sensor.axes == Axes.PLATFORM_ENU:
+        name = f" '{sensor.platform}'" if sensor.platform else ""
+        raise UserError(
+            f"sensor '{sensor.id}' has axes = \"{sensor.axes}\" but there is no track of its platform{name}"
+        )
+    return np.zeros((n, 3)), np.zeros((n, 3)), np.broadcast_to(_NORTH_LEVEL, (n, 3, 3)).copy(), np.zeros((n, 3))
+
+
+def _body_from_mount(sensor: Sensor) -> FloatArray:
+    mount = sensor.mount
+    if sensor.axes != Axes.MOUNT:
+        return np.eye(3)
+    R: FloatArray = rotation.matrix_from_ypr(float(mount.yaw), float(mount.pitch), float(mount.roll))
+    return R
+
+
+def _north_aligned(track: PoseTrack, position: FloatArray) -> FloatArray:
+    if track.site is None:
+        return np.broadcast_to(np.eye(3), (len(position), 3, 3)).copy()
+    site = track.site
+    R: FloatArray = kernel.local_level(position, site.latitude, site.longitude, site.height)
+    return R
+
+
+def _attitudes(
+    ypr: FloatArray, t_attitude: FloatArray, t: FloatArray, p: FloatArray, v: FloatArray, site: Any
+) -> FloatArray:
+    if not len(t_attitude):
+        return np.zeros((0, 4))
+    yaw, pitch, roll = (np.ascontiguousarray(ypr[:, i]) for i in range(3))
+    R = ENU_FROM_NED @ rotations.matrix_from_ypr(yaw, pitch, roll)
+    if site is not None:
+        where, _ = kernel.interpolate_position(t, p, v, np.zeros(max(len(t) - 1, 0), dtype=np.bool_), t_attitude)
+        R = kernel.local_level(where, site.latitude, site.longitude, site.height) @ R
+    q: FloatArray = rotations.quaternion_from_matrix(np.ascontiguousarray(R))
+    return q
+
+
+def _covered(nodes: FloatArray, t: FloatArray, max_gap: float, max_extrapolation: float) -> NDArray[np.bool_]:
+    if not len(nodes):
+        return np.zeros(len(t), dtype=bool)
+    inside: NDArray[np.bool_] = (t >= nodes[0] - max_extrapolation) & (t <= nodes[-1] + max_extrapolation)
+    i = np.clip(np.searchsorted(nodes, t, side="right") - 1, 0, max(len(nodes) - 2, 0))
+    gap = nodes[np.minimum(i + 1, len(nodes) - 1)] - nodes[i]
+    on_stamp = np.isin(t, nodes)
+    between = (t > nodes[0]) & (t < nodes[-1]) & ~on_stamp
+    out: NDArray[np.bool_] = inside & ~(between & (gap > max_gap))
+    return out

@@ -1,0 +1,193 @@
+"""Where a platform was and how it was turned between its navigation stamps."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from boresight.kernels import geodesy
+from boresight.types.sensor import FloatArray
+
+_ecef_from_enu = geodesy.ecef_from_enu
+_geodetic_from_ecef = geodesy.geodetic_from_ecef
+_ecef_from_enu_rotation = geodesy.ecef_from_enu_rotation
+_fill_rotation = geodesy.fill_ecef_from_enu
+
+
+@njit(cache=True)
+def segment(nodes: FloatArray, t: float) -> int:
+    """Return i with nodes[i] <= t < nodes[i + 1], kept within the first and the last segment."""
+    i = int(np.searchsorted(nodes, t, side="right")) - 1
+    return min(max(i, 0), max(len(nodes) - 2, 0))
+
+
+@njit(cache=True)
+def interpolate_position(
+    nodes: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    hermite: NDArray[np.bool_],
+    t: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return position and velocity (n, 3) at `t`: cubic Hermite where `hermite`, else linear in both.
+
+    Before the first and after the last node: constant velocity of that node.
+    """
+    p = np.empty((len(t), 3))
+    v = np.empty((len(t), 3))
+    last = len(nodes) - 1
+    for k in range(len(t)):
+        if t[k] <= nodes[0] or t[k] >= nodes[last]:
+            end = 0 if t[k] <= nodes[0] else last
+            for j in range(3):
+                v[k, j] = velocity[end, j]
+                p[k, j] = position[end, j] + velocity[end, j] * (t[k] - nodes[end])
+            continue
+        i = segment(nodes, t[k])
+        h = nodes[i + 1] - nodes[i]
+        s = (t[k] - nodes[i]) / h
+        for j in range(3):
+            p0, p1, v0, v1 = position[i, j], position[i + 1, j], velocity[i, j], velocity[i + 1, j]
+            if hermite[i]:
+                # p0 + s (h v0 + s (3 d - h (2 v0 + v1) + s (h (v0 + v1) - 2 d))), d = p1 - p0
+                d = p1 - p0
+                b = 3.0 * d - h * (2.0 * v0 + v1)
+                c = h * (v0 + v1) - 2.0 * d
+                p[k, j] = p0 + s * (h * v0 + s * (b + s * c))
+                v[k, j] = v0 + s * (2.0 * b + 3.0 * s * c) / h
+            else:
+                p[k, j] = p0 + s * (p1 - p0)
+                v[k, j] = v0 + s * (v1 - v0)
+    return p, v
+
+
+@njit(cache=True)
+def interpolate_attitude(
+    nodes: FloatArray, quaternion: FloatArray, steps: FloatArray, t: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return rotations (n, 3, 3) and body rates (n, 3) (rad/s, in body axes) at `t` by slerp.
+
+    `steps` (m - 1, 3) are the rotation vectors between the nodes. Beyond the ends the last turning goes on.
+    """
+    R = np.empty((len(t), 3, 3))
+    rate = np.zeros((len(t), 3))
+    for k in range(len(t)):
+        i = segment(nodes, t[k])
+        w, x, y, z = quaternion[i, 0], quaternion[i, 1], quaternion[i, 2], quaternion[i, 3]
+        if len(nodes) > 1:
+            h = nodes[i + 1] - nodes[i]
+            a, b, c = steps[i, 0] / h, steps[i, 1] / h, steps[i, 2] / h
+            rate[k, 0], rate[k, 1], rate[k, 2] = a, b, c
+            dw, dx, dy, dz = _turn(a, b, c, t[k] - nodes[i])
+            w, x, y, z = (
+                w * dw - x * dx - y * dy - z * dz,
+                w * dx + x * dw + y * dz - z * dy,
+                w * dy - x * dz + y * dw + z * dx,
+                w * dz + x * dy - y * dx + z * dw,
+            )
+        R[k, 0, 0], R[k, 0, 1], R[k, 0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+        R[k, 1, 0], R[k, 1, 1], R[k, 1, 2] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
+        R[k, 2, 0], R[k, 2, 1], R[k, 2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+    return R, rate
+
+
+@njit(cache=True)
+def _turn(a: float, b: float, c: float, dt: float) -> tuple[float, float, float, float]:
+    """Return the quaternion of turning at the rate (a, b, c) (rad/s) for `dt` (s)."""
+    rate = math.sqrt(a * a + b * b + c * c)
+    half = 0.5 * rate * dt
+    k = math.sin(half) / rate if rate > 0.0 else 0.0
+    return math.cos(half), k * a, k * b, k * c
+
+
+@njit(cache=True)
+def add_lever_arm(
+    position: FloatArray, velocity: FloatArray, enu_from_body: FloatArray, rate: FloatArray, arm: FloatArray
+) -> None:
+    """Move positions (n, 3) by the turned lever arm (3,) (FRD, m), and velocities by rate × arm, in place."""
+    spin = np.empty(3)
+    for k in range(len(position)):
+        w, R = rate[k], enu_from_body[k]
+        spin[0] = w[1] * arm[2] - w[2] * arm[1]
+        spin[1] = w[2] * arm[0] - w[0] * arm[2]
+        spin[2] = w[0] * arm[1] - w[1] * arm[0]
+        for j in range(3):
+            position[k, j] += R[j, 0] * arm[0] + R[j, 1] * arm[1] + R[j, 2] * arm[2]
+            velocity[k, j] += R[j, 0] * spin[0] + R[j, 1] * spin[1] + R[j, 2] * spin[2]
+
+
+@njit(cache=True)
+def sensor_axes(enu_from_body: FloatArray, body_from_mount: FloatArray) -> FloatArray:
+    """Return (n, 3, 3): columns right, forward, up of a sensor mounted by `body_from_mount` (3, 3), in ENU."""
+    out = np.empty_like(enu_from_body)
+    for k in range(len(out)):
+        for i in range(3):
+            f, r, d = 0.0, 0.0, 0.0
+            for j in range(3):
+                f += enu_from_body[k, i, j] * body_from_mount[j, 0]
+                r += enu_from_body[k, i, j] * body_from_mount[j, 1]
+                d += enu_from_body[k, i, j] * body_from_mount[j, 2]
+            out[k, i, 0], out[k, i, 1], out[k, i, 2] = r, f, -d
+    return out
+
+
+@njit(cache=True)
+def local_level(position: FloatArray, lat0: float, lon0: float, h0: float) -> FloatArray:
+    """Return (n, 3, 3): the site's ENU from the ENU of a platform at `position` (n, 3), over the ellipsoid."""
+    out = np.empty((len(position), 3, 3))
+    site = _ecef_from_enu_rotation(lat0, lon0)
+    local = np.empty((3, 3))
+    for k in range(len(position)):
+        x, y, z = _ecef_from_enu(position[k, 0], position[k, 1], position[k, 2], lat0, lon0, h0)
+        latitude, longitude, _ = _geodetic_from_ecef(x, y, z)
+        _fill_rotation(math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude), local)
+        for i in range(3):
+            for j in range(3):
+                out[k, i, j] = site[0, i] * local[0, j] + site[1, i] * local[1, j] + site[2, i] * local[2, j]
+    return out
+
+
+@njit(cache=True)
+def first_uncovered(nodes: FloatArray, t: FloatArray, max_gap: float, max_extrapolation: float) -> tuple[int, float]:
+    """Return the first row of `t` that the nodes do not cover and its gap (s; 0 beyond the ends); (-1, 0) if none."""
+    last = len(nodes) - 1
+    for k in range(len(t)):
+        if not (nodes[0] - max_extrapolation <= t[k] <= nodes[last] + max_extrapolation):
+            return k, 0.0
+        if nodes[0] < t[k] < nodes[last]:
+            i = segment(nodes, t[k])
+            if nodes[i + 1] - nodes[i] > max_gap and t[k] != nodes[i]:
+                return k, nodes[i + 1] - nodes[i]
+    return -1, 0.0
+
+
+@njit(cache=True)
+def slopes(nodes: FloatArray, position: FloatArray, window: float) -> FloatArray:
+    """Return velocities (n, 3): least-squares slopes over the nodes within ±window (s), at least the neighbours."""
+    n = len(nodes)
+    v = np.zeros((n, 3))
+    if n == 1:
+        return v
+    first, last = 0, 0
+    for k in range(n):
+        while nodes[k] - nodes[first] > window:
+            first += 1
+        while last + 1 < n and nodes[last + 1] - nodes[k] <= window:
+            last += 1
+        i = min(first, max(k - 1, 0))
+        j = max(last, min(k + 1, n - 1))
+        mean = 0.0
+        for m in range(i, j + 1):
+            mean += (nodes[m] - nodes[k]) / (j - i + 1)
+        total = 0.0
+        for m in range(i, j + 1):
+            dt = nodes[m] - nodes[k] - mean
+            total += dt * dt
+            for c in range(3):
+                v[k, c] += dt * (position[m, c] - position[k, c])
+        for c in range(3):
+            v[k, c] /= total
+    return v
