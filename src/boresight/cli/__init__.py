@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
-from cyclopts import App
+from cyclopts import App, CycloptsError, Parameter
 
 from boresight._version import __version__
 from boresight.errors import UserError
@@ -14,10 +15,14 @@ app = App(
     help="From radar, infrared and optical reports to tracks and pointing commands.",
     version=__version__,
     help_format="plaintext",
+    default_parameter=Parameter(negative=""),
 )
 
 # One line a command: module:function, and the sentence that `boresight --help` shows.
-COMMANDS: dict[str, tuple[str, str]] = {}
+COMMANDS: dict[str, tuple[str, str]] = {
+    "import": ("boresight.cli.import_:app", "Turn other formats into a recording."),
+    "info": ("boresight.cli.info:info", "Say what is in a recording."),
+}
 
 for _name, (_target, _help) in COMMANDS.items():
     app.command(_target, name=_name, help=_help)
@@ -26,7 +31,18 @@ for _name, (_target, _help) in COMMANDS.items():
 def main() -> None:
     """Run the command line; exit 0 done, 2 bad usage or input (one line on standard error), 1 our fault."""
     try:
-        app()
+        app(exit_on_error=False, print_error=False)
     except UserError as error:
-        print(f"boresight: {error}", file=sys.stderr)
-        sys.exit(2)
+        _usage(str(error))
+    except CycloptsError as error:
+        _usage(str(error))
+    except BrokenPipeError:  # the reader of our output has gone (`| head`)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+def _usage(message: str) -> None:
+    print(f"boresight: {' '.join(message.split())}", file=sys.stderr)
+    sys.exit(2)

@@ -1,0 +1,88 @@
+"""`boresight info`: what is in a recording."""
+
+from __future__ import annotations
+
+from math import degrees
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from boresight.cli.output import print_json, print_table
+from boresight.io.inventory import inventory
+from boresight.io.recording import read_recording
+from boresight.types import Recording
+
+SENSOR_COLUMNS = {
+    "id": "sensor",
+    "kind": "kind",
+    "looks": "looks",
+    "empty_looks": "empty",
+    "detections": "detec-\ntions",
+    "detections_per_look": "per\nlook",
+    "median_period_s": "period\ns",
+    "longest_gap_s": "gap\ns",
+    "out_of_order": "out of\norder",
+    "duplicates": "dupli-\ncates",
+}
+PATH_COLUMNS = {
+    "item": "path",
+    "id": "id",
+    "rows": "rows",
+    "duration_s": "duration\ns",
+    "median_period_s": "period\ns",
+    "longest_gap_s": "gap\ns",
+    "path_m": "length\nm",
+    "attitude": "attitude",
+}
+
+
+def info(rec: Path, /, *, json: bool = False) -> None:
+    """Say what is in a recording: sensors, rates, gaps, out-of-order stamps, detections per look, platforms, truth.
+
+    Parameters
+    ----------
+    rec
+        Folder of the recording.
+    json
+        Print one JSON object instead of tables.
+    """
+    recording = read_recording(rec)
+    rows = inventory(recording)
+    if json:
+        print_json("info", {"recording": str(rec), **_about(recording)}, rows)
+        return
+    about = _about(recording)
+    print(
+        f"{about['name'] or rec.name}: {about['dimensions']}-D, {about['duration_s']:.1f} s, {about['rows']} rows\n"
+        f"site {about['latitude_deg']:.6f}°, {about['longitude_deg']:.6f}°, {about['height_m']:.1f} m; "
+        f"first stamp {about['start_s']:.3f} s\n"
+        f"rows stamped before an earlier row: {about['out_of_order']}, by up to {about['longest_step_back_s']:.3g} s"
+    )
+    sensors = [r for r in rows if r["item"] == "sensor"]
+    print_table(SENSOR_COLUMNS, sensors, digits=3)
+    late = [f"{r['id']} {r['latency_s']:g} s" for r in sensors if r["latency_s"]]
+    print(f"declared latency: {', '.join(late) or 'none'}")
+    paths = [r for r in rows if r["item"] != "sensor"]
+    if paths:
+        print_table(PATH_COLUMNS, paths)
+    if not recording.truth:
+        print("no truth: tracks can be made, not scored")
+
+
+def _about(recording: Recording) -> dict[str, Any]:
+    t, site = recording.detections.t, recording.site
+    back = np.maximum.accumulate(t) - t
+    return {
+        "name": recording.name,
+        "dimensions": recording.dimensions,
+        "latitude_deg": degrees(site.latitude),
+        "longitude_deg": degrees(site.longitude),
+        "height_m": site.height,
+        "rows": len(t),
+        "start_s": float(t.min()),
+        "end_s": float(t.max()),
+        "duration_s": float(t.max() - t.min()),
+        "out_of_order": int((back > 0).sum()),
+        "longest_step_back_s": float(back.max()),
+    }

@@ -1,0 +1,158 @@
+"""A results folder (tracks.parquet, decisions.parquet, summary.json) to and from `types.Results`."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from boresight.errors import UserError, did_you_mean
+from boresight.io.files import read_text
+from boresight.io.paths import ENU, VELOCITY
+from boresight.io.table import NUMBER, TEXT, WHOLE, Table, nullable, read_table, write_table
+from boresight.types import FATES, NO_TRACK, STATUSES, DecisionRows, FloatArray, Recording, Results, TrackRows
+
+COVARIANCE = {
+    "cov_ee": (0, 0),
+    "cov_en": (0, 1),
+    "cov_nn": (1, 1),
+    "cov_eu": (0, 2),
+    "cov_nu": (1, 2),
+    "cov_uu": (2, 2),
+}
+TRACK_SCHEMA: dict[str, str] = {
+    "t_s": NUMBER,
+    "t_known_s": NUMBER,
+    "track_id": WHOLE,
+    "status": TEXT,
+    **dict.fromkeys((*ENU, *VELOCITY, *COVARIANCE), NUMBER),
+}
+DECISION_SCHEMA: dict[str, str] = {"row": WHOLE, "fate": TEXT, "track_id": WHOLE, "nis": NUMBER, "reason": TEXT}
+
+
+def write_results(results: Results, recording: Recording, folder: Path) -> None:
+    """Write the three files into a folder that is there (see `files.output_folder`).
+
+    summary.json gets the key `recording` (name, dimensions, site), so that results can be exported by themselves.
+    """
+    write_table(folder / "tracks.parquet", _track_columns(results.tracks))
+    write_table(folder / "decisions.parquet", _decision_columns(results.decisions))
+    site = recording.site
+    about = {
+        "name": recording.name,
+        "dimensions": recording.dimensions,
+        "site": {
+            "latitude_deg": math.degrees(site.latitude),
+            "longitude_deg": math.degrees(site.longitude),
+            "height_m": site.height,
+        },
+    }
+    summary = finite({**results.summary, "recording": about})
+    (folder / "summary.json").write_text(json.dumps(summary, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def read_results(path: Path | str) -> Results:
+    """Read and check a results folder; raises UserError that names file, row and column."""
+    folder = Path(path)
+    if not folder.is_dir():
+        what = "is a file, not a results folder" if folder.exists() else "no such results folder"
+        raise UserError(f"{folder}: {what}")
+    return Results(
+        _tracks(read_table(folder / "tracks.parquet", TRACK_SCHEMA, tuple(TRACK_SCHEMA))),
+        _decisions(read_table(folder / "decisions.parquet", DECISION_SCHEMA, tuple(DECISION_SCHEMA), others=True)),
+        read_summary(folder / "summary.json"),
+    )
+
+
+def read_summary(path: Path) -> dict[str, Any]:
+    """Read summary.json; raises UserError."""
+    try:
+        data = json.loads(read_text(path))
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise UserError(f"{path}: not valid JSON (truncated or damaged): {error}") from None
+    if not isinstance(data, dict):
+        raise UserError(f"{path}: expected one JSON object")
+    return data
+
+
+def _tracks(table: Table) -> TrackRows:
+    t, known = table.numbers("t_s", required=True), table.numbers("t_known_s", required=True)
+    table.fail_where(known > t, "t_known_s = {} is later than t_s", known)
+    covariance = np.full((len(table), 3, 3), np.nan)
+    for name, (i, j) in COVARIANCE.items():
+        covariance[:, i, j] = covariance[:, j, i] = table.numbers(name, required=2 not in (i, j))
+    position = [table.numbers(n, required=n != "up_m") for n in ENU]
+    velocity = [table.numbers(n, required=n != "vu_m_s") for n in VELOCITY]
+    ids, status = table.whole("track_id"), _coded(table, "status", STATUSES)
+    return TrackRows(t, known, ids, status, np.stack(position, 1), np.stack(velocity, 1), covariance)
+
+
+def _decisions(table: Table) -> DecisionRows:
+    track = table.numbers("track_id", default=float(NO_TRACK)).astype(np.int64)
+    reason = np.empty(len(table), dtype=object)
+    reason[:] = table.objects("reason") or [None] * len(table)
+    extra = {
+        name: table.data.column(name).to_numpy() for name in table.data.column_names if name not in DECISION_SCHEMA
+    }
+    return DecisionRows(table.whole("row"), _coded(table, "fate", FATES), track, table.numbers("nis"), reason, extra)
+
+
+def _coded(table: Table, column: str, words: tuple[str, ...]) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    codes, found = table.codes(column)
+    for i, word in enumerate(found):
+        if word not in words:
+            table.fail(int(np.argmax(codes == i)), f"{column} is '{word}', not known{did_you_mean(word, words)}")
+    index = np.array([words.index(w) for w in found], dtype=np.uint8)
+    return index[codes] if len(index) else np.zeros(0, dtype=np.uint8)
+
+
+def _track_columns(rows: TrackRows) -> dict[str, Any]:
+    out: dict[str, Any] = {
+        "t_s": rows.t,
+        "t_known_s": rows.t_known,
+        "track_id": rows.track_id.astype(np.int64),
+        "status": _words(rows.status, STATUSES),
+    }
+    out |= {n: nullable(_floats(rows.position[:, i])) for i, n in enumerate(ENU)}
+    out |= {n: nullable(_floats(rows.velocity[:, i])) for i, n in enumerate(VELOCITY)}
+    return out | {n: nullable(_floats(rows.covariance[:, i, j])) for n, (i, j) in COVARIANCE.items()}
+
+
+def _decision_columns(rows: DecisionRows) -> dict[str, Any]:
+    out: dict[str, Any] = {
+        "row": rows.row.astype(np.int64),
+        "fate": _words(rows.fate, FATES),
+        "track_id": pa.array(rows.track_id.astype(np.int64), mask=rows.track_id == NO_TRACK),
+        "nis": nullable(_floats(rows.nis)),
+        "reason": pa.array(rows.reason.tolist(), pa.string()),
+    }
+    return out | {name: pa.array(values, from_pandas=True) for name, values in rows.extra.items()}
+
+
+def _floats(values: FloatArray) -> FloatArray:
+    return np.ascontiguousarray(values, dtype=np.float64)
+
+
+def _words(codes: np.ndarray[Any, np.dtype[np.uint8]], words: tuple[str, ...]) -> pa.Array:
+    names = np.array([str(w) for w in words], dtype=object)
+    return pa.array(names[codes], pa.string())
+
+
+def finite(value: Any) -> Any:
+    """Return plain JSON data: NumPy scalars and arrays as numbers and lists, what is not finite as None."""
+    if isinstance(value, Mapping):
+        return {str(k): finite(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray):
+        return finite(value.tolist())
+    if isinstance(value, list | tuple):
+        return [finite(v) for v in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value if value is None or isinstance(value, bool | int | float) else str(value)
