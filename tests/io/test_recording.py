@@ -29,7 +29,7 @@ def test_values_arrive_in_si_and_radians(write: Write) -> None:
     np.testing.assert_allclose(d.sigma[0, :3], [5.0, math.radians(1.0), np.nan])
     np.testing.assert_array_equal(d.sigma[3, 4:], [1.5, 1.5, np.nan])
     np.testing.assert_array_equal(d.t_recv, [1.0, 1.1, 1.1, 2.0, 2.0, 2.5])
-    np.testing.assert_allclose(rec.platforms[0].ypr[0], [math.pi / 2, np.nan, np.nan])
+    np.testing.assert_allclose(rec.platforms[0].ypr[0], [math.pi / 2, 0.0, 0.0])  # heading alone: level
     assert rec.truth[0].position[1].tolist() == [5.0, 1.0, 0.0]
     assert rec.ignore[0].radius.tolist() == [40.0, 40.0]
 
@@ -290,3 +290,16 @@ def test_other_number_types_are_read(write: Write) -> None:
     table = table.set_column(table.column_names.index("sensor"), "sensor", table["sensor"].dictionary_encode())
     pq.write_table(table, folder / "detections.parquet")
     assert [len(s.row) for s in iter_scans(read_recording(folder))] == [2, 1, 2, 0]
+
+
+def test_geodetic_platforms_agree_with_pymap3d(write: Write) -> None:
+    pymap3d = pytest.importorskip("pymap3d")
+    lat, lon, height = [63.44, 63.45], [10.40, 10.38], [40.0, 41.0]
+
+    def edit(c):
+        c["platform"] = {"t_s": [0.0, 10.0], "platform": ["ferry"] * 2, "yaw_deg": [90.0, 90.0]}
+        c["platform"] |= {"latitude_deg": lat, "longitude_deg": lon, "height_m": height}
+
+    rec = read_recording(write(edit))
+    enu = pymap3d.geodetic2enu(lat, lon, height, 63.4389029083, 10.39908278, 39.923)
+    np.testing.assert_allclose(rec.platforms[0].position.T, enu, atol=1e-6)  # metres

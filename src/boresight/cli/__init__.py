@@ -22,6 +22,7 @@ app = App(
 COMMANDS: dict[str, tuple[str, str]] = {
     "import": ("boresight.cli.import_:app", "Turn other formats into a recording."),
     "info": ("boresight.cli.info:info", "Say what is in a recording."),
+    "export": ("boresight.cli.export:export", "Write tracks as CSV, GeoJSON or KML."),
 }
 
 for _name, (_target, _help) in COMMANDS.items():
@@ -31,7 +32,7 @@ for _name, (_target, _help) in COMMANDS.items():
 def main() -> None:
     """Run the command line; exit 0 done, 2 bad usage or input (one line on standard error), 1 our fault."""
     try:
-        app(exit_on_error=False, print_error=False)
+        app(sys.argv[1:], exit_on_error=False, print_error=False)
     except UserError as error:
         _usage(str(error))
     except CycloptsError as error:

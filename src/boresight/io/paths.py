@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from boresight.errors import UserError
 from boresight.io.declaration import DEG
 from boresight.io.table import NUMBER, TEXT, Table, nullable
 from boresight.types import FloatArray, Ignore, PlatformTrack, Site, Truth
@@ -41,6 +40,8 @@ def platforms_of(table: Table, site: Site, dimensions: int) -> tuple[PlatformTra
         table.fail_where(values <= 0, f"{name} is not above zero; leave it null when not known")
     out = []
     for name, rows, t in _by_name(table, "platform"):
+        if np.isnan(ypr[rows, 1:]).all():  # a heading alone: the platform is taken as level
+            ypr[rows, 1:] = np.where(np.isnan(ypr[rows, :1]), np.nan, 0.0)
         out.append(PlatformTrack(name, t, position[rows], velocity[rows], ypr[rows], sigma[rows], turn[rows]))
     return tuple(out)
 
@@ -61,7 +62,9 @@ def _platform_positions(table: Table, site: Site, dimensions: int) -> FloatArray
     if "height_m" not in table and not flat:
         table.fail(None, "column 'height_m' is missing")
     height = table.numbers("height_m", required=not flat, default=site.height)
-    raise UserError(f"{table.path}: {len(longitude + height)} geodetic rows; give east_m, north_m, up_m")
+    from boresight.frames.local import enu_from_geodetic  # compiled code: loaded only where it is needed
+
+    return np.stack(enu_from_geodetic(latitude * DEG, longitude * DEG, height, site), axis=1)
 
 
 def truths_of(table: Table, dimensions: int) -> tuple[Truth, ...]:

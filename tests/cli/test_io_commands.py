@@ -1,0 +1,104 @@
+"""import, info and export from the outside: exit codes, one-line errors, nothing half-written."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from boresight.io import read_recording, write_results
+from tests.cli.conftest import Ran, Run
+from tests.io.test_results import some_results
+from tests.io.test_user_csv import files
+
+
+@pytest.fixture
+def rec(run: Run, tmp_path: Path) -> Path:
+    """A small recording."""
+    detections, sensors = files(tmp_path)
+    assert run("import", "csv", detections, "--sensors", sensors, "-o", tmp_path / "rec").code == 0
+    return tmp_path / "rec"
+
+
+@pytest.fixture
+def out(rec: Path, tmp_path: Path) -> Path:
+    """A small results folder."""
+    folder = tmp_path / "out"
+    folder.mkdir()
+    write_results(some_results(), read_recording(rec), folder)
+    return folder
+
+
+def refused(ran: Ran, *words: str) -> None:
+    assert ran.code == 2
+    assert ran.out == ""
+    assert ran.err.count("\n") == 1
+    assert ran.err.startswith("boresight: ")
+    for word in words:
+        assert word in ran.err
+
+
+def test_info_prints_one_json_object(run: Run, rec: Path) -> None:
+    data = json.loads(run("info", rec, "--json").out)
+    assert data["command"] == "info"
+    row = data["rows"][0]
+    assert (row["id"], row["looks"], row["empty_looks"], row["detections"]) == ("radar", 3, 1, 2)
+    assert row["median_period_s"] == 1.0
+    assert row["platform"] is None
+
+
+def test_info_fits_80_columns_without_colour_when_piped(run: Run, rec: Path) -> None:
+    ran = run("info", rec)
+    assert ran.code == 0
+    assert "\x1b" not in ran.out
+    assert max(map(len, ran.out.splitlines())) <= 80
+    assert "radar" in ran.out
+
+
+def test_export_to_standard_output_and_to_a_file(run: Run, out: Path, rec: Path, tmp_path: Path) -> None:
+    text = run("export", out, "--to", "csv").out
+    assert text.startswith("t_s,t_known_s,track_id")
+    assert run("export", out, rec, "--to", "geojson", "-o", tmp_path / "x.json").code == 0
+    assert json.loads((tmp_path / "x.json").read_text())["type"] == "FeatureCollection"
+    refused(run("export", out, "--to", "geojson", "-o", tmp_path / "x.json"), "--force")
+    refused(run("export", out, "--to", "shp"), "geojson")
+
+
+def test_an_existing_output_is_kept(run: Run, rec: Path, tmp_path: Path) -> None:
+    before = (rec / "detections.parquet").read_bytes()
+    words = ("import", "csv", tmp_path / "d.csv", "--sensors", tmp_path / "s.toml", "-o", rec)
+    refused(run(*words), "--force", "rec")
+    assert (rec / "detections.parquet").read_bytes() == before
+    assert run(*words, "--force").code == 0
+
+
+def test_a_failed_import_leaves_nothing_and_keeps_the_old(run: Run, rec: Path, tmp_path: Path) -> None:
+    (tmp_path / "d.csv").write_text("t_s,sensor,scan,range_m\nx,radar,0,1\n")
+    refused(run("import", "csv", tmp_path / "d.csv", "--sensors", tmp_path / "s.toml", "-o", rec, "--force"), "line 2")
+    assert (rec / "detections.parquet").exists()
+    refused(run("import", "csv", tmp_path / "d.csv", "--sensors", tmp_path / "s.toml", "-o", tmp_path / "new"))
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["d.csv", "rec", "s.toml"]
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="the superuser may write everywhere")
+def test_an_unwritable_folder_is_named(run: Run, tmp_path: Path) -> None:
+    detections, sensors = files(tmp_path)
+    (tmp_path / "locked").mkdir(mode=0o500)
+    refused(run("import", "csv", detections, "--sensors", sensors, "-o", tmp_path / "locked" / "rec"), "written")
+
+
+def test_an_output_under_a_file_is_named(run: Run, tmp_path: Path) -> None:
+    detections, sensors = files(tmp_path)
+    refused(run("import", "csv", detections, "--sensors", sensors, "-o", detections / "rec"), "cannot be made")
+    refused(run("import", "csv", detections, "--sensors", sensors, "-o", detections), "not a folder")
+
+
+def test_usage_errors_are_one_line(run: Run, tmp_path: Path) -> None:
+    refused(run("infoo"), "info")
+    refused(run("info"), "REC")
+    refused(run("info", tmp_path / "none"), "no such recording folder")
+    refused(run("info", tmp_path, "--jsn"), "--json")
+    refused(run("import", "autoferry", tmp_path / "none.json", "-o", tmp_path / "r"), "no such file")
+    refused(run("export", tmp_path / "none", "--to", "kml"), "no such results folder")
