@@ -1,0 +1,1 @@
+"""Fusing measurements before any track is asked."""
