@@ -23,6 +23,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "import": ("boresight.cli.import_:app", "Turn other formats into a recording."),
     "info": ("boresight.cli.info:info", "Say what is in a recording."),
     "export": ("boresight.cli.export:export", "Write tracks as CSV, GeoJSON or KML."),
+    "paper": ("boresight.cli.paper:app", "Print a paper's table: as printed, corrected, and ours."),
 }
 
 for _name, (_target, _help) in COMMANDS.items():

@@ -1,0 +1,15 @@
+"""`boresight paper`: the tables of the papers, as printed, corrected, and ours."""
+
+from __future__ import annotations
+
+from cyclopts import App
+
+app = App(name="paper", help="Print a paper's table: as printed, corrected, and ours.", help_format="plaintext")
+
+# One line a paper: module:function, and the sentence that `boresight paper --help` shows.
+PAPERS: dict[str, tuple[str, str]] = {
+    "shao2012": ("boresight.cli.paper_shao2012:shao2012", "Radar and infrared in modified spherical coordinates."),
+}
+
+for _name, (_target, _help) in PAPERS.items():
+    app.command(_target, name=_name, help=_help)

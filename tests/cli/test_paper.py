@@ -1,0 +1,44 @@
+"""`boresight paper`: the JSON object that other tools read."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+
+def boresight(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", "from boresight.cli import main; main()", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_shao2012_json() -> None:
+    done = boresight("paper", "shao2012", "--set", "C", "--runs", "3", "--seed", "2", "--json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["command"] == "paper shao2012"
+    assert told["parameters"] == {"set": "C", "runs": 3, "seed": 2}
+    keys = {"method", "az_mrad", "el_mrad", "range_m", "velocity_m_s", "az_ratio", "el_ratio", "range_ratio"}
+    keys |= {"velocity_ratio", "anees_per_dim", "us_per_update"}
+    assert all(set(row) == keys for row in told["rows"])
+    methods = {row["method"] for row in told["rows"]}
+    assert methods >= {"as_printed", "corrected_angles_only", "corrected", "msc", "ekf", "iekf", "ukf", "radar_only"}
+    assert methods >= {"ir_only", "rts"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [(("--set", "X"), "--set must be one of A"), (("--runs", "0"), "--runs must be at least 1")],
+)
+def test_mistakes_end_with_one_line(arguments: tuple[str, ...], message: str) -> None:
+    done = boresight("paper", "shao2012", *arguments)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not done.stdout
