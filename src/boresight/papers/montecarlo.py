@@ -50,7 +50,7 @@ def wrapped(angle: FloatArray) -> FloatArray:
 def nees(error: FloatArray, P: FloatArray) -> FloatArray:
     """Return eᵀP⁻¹e over leading axes; NaN where P is singular or not finite."""
     with np.errstate(all="ignore"):
-        good = np.isfinite(P).all(axis=(-2, -1)) & np.isfinite(error).all(axis=-1)
+        good = np.asarray(np.isfinite(P).all(axis=(-2, -1)) & np.isfinite(error).all(axis=-1))
         safe = np.where(good[..., None, None], P, np.eye(P.shape[-1]))
         out = np.einsum("...i,...i", error, np.linalg.solve(safe, error[..., None])[..., 0])
     return np.where(good, out, np.nan)
