@@ -1,0 +1,524 @@
+"""One scan through the tracker: the order of things is the order of the functions below."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from boresight.kernels.assignment import assign_sparse
+from boresight.kernels.tracker import (
+    AZIMUTH_BINS,
+    GATED,
+    HIDDEN,
+    INITIATED,
+    NOTHING,
+    OUTSIDE,
+    STATIC,
+    UNASSOCIATED,
+    UPDATED,
+    VISIBLE,
+    IntArray,
+    Look,
+    SensorTable,
+    Settings,
+    Tracks,
+    apply_update,
+    components,
+    coverage_of,
+    innovation,
+    linearise,
+    position_fix,
+    predict_all,
+    static_likelihood,
+    volume_of,
+)
+from boresight.kernels.measurement import measure
+from boresight.types.sensor import FloatArray
+
+LOG_2PI = math.log(2.0 * math.pi)
+
+
+@njit(cache=True)
+def azimuth_bin(azimuth: float) -> int:
+    """Return the clutter-map bin of an azimuth (rad)."""
+    return int((azimuth + math.pi) / (2.0 * math.pi) * AZIMUTH_BINS) % AZIMUTH_BINS
+
+
+@njit(cache=True)
+def clutter_density(tr: Tracks, s: Settings, sensor: SensorTable, z: FloatArray, mask: IntArray, m: int) -> float:
+    """Expected false detections per unit volume of the measured components around `z`, as learned so far."""
+    known = tr.clutter[sensor.index]
+    high = sensor.range_high if math.isfinite(sensor.range_high) else max(tr.seen_range[sensor.index], 100.0)
+    volume = volume_of(mask, m, sensor, high, s.d, s.speed_sigma)
+    if sensor.ranging:
+        return known[AZIMUTH_BINS] / volume
+    share = 2.0 * math.pi / AZIMUTH_BINS / max(sensor.azimuth_span, 1e-9)
+    b = azimuth_bin(z[1])
+    local = (known[(b - 1) % AZIMUTH_BINS] + 2.0 * known[b] + known[(b + 1) % AZIMUTH_BINS]) / 4.0
+    return local / (volume * share)
+
+
+@njit(cache=True)
+def detection_probability(tr: Tracks, i: int, s: Settings, look: Look, sensor: SensorTable, z: FloatArray, h6: FloatArray) -> float:
+    """Probability that the sensor, looking once, reports a visible target where track `i` is; 0 outside coverage."""
+    m = len(look.dt)
+    position = np.zeros(3)
+    for a in range(s.d):
+        position[a] = tr.x[i, a]
+    measure(position, np.zeros(3), look.sensor_position[m], look.sensor_velocity[m], look.enu_from_sensor[m], z, h6)
+    if not coverage_of(z, sensor, 0.0):
+        return 0.0
+    p = sensor.p_detection
+    if math.isfinite(sensor.fade_range):
+        p /= 1.0 + (z[0] / sensor.fade_range) ** 4
+    return p
+
+
+@njit(cache=True)
+def scan_step(
+    tr: Tracks, s: Settings, sensor: SensorTable, look: Look, fate: IntArray, owner: IntArray, nis_of: FloatArray
+) -> None:
+    """Take one scan: predict, gate, assign, update, weigh, begin and end tracks; `fate`, `owner`, `nis_of` are (m,).
+
+    `owner` is the birth row of the track that a detection updated, began, or was nearest to (-1: none). The arrays of
+    `tr` must have room for m more tracks.
+    """
+    predict_all(tr, s, look.t)
+    m = len(look.dt)
+    n_tracks = tr.count[0]
+    usable = np.zeros(m, np.bool_)
+    for k in range(m):
+        fate[k] = UNASSOCIATED
+        owner[k] = -1
+        nis_of[k] = np.nan
+        usable[k] = coverage_of(look.z[k], sensor, 1.0)
+        if not usable[k]:
+            fate[k] = OUTSIDE
+    p_d = np.zeros(n_tracks)
+    z = np.empty(7)
+    h6 = np.empty((7, 6))
+    for i in range(n_tracks):
+        p_d[i] = detection_probability(tr, i, s, look, sensor, z, h6)
+    start, column, cost, distance, loglik = gate_all(tr, s, sensor, look, usable, p_d, fate, owner, nis_of)
+    col_of_row = np.full(n_tracks, -1, np.int64)
+    assign_sparse(start, column, cost, m, col_of_row)
+    row_of_col = np.full(m, -1, np.int64)
+    for i in range(n_tracks):
+        if col_of_row[i] >= 0:
+            row_of_col[col_of_row[i]] = i
+    claims = np.zeros(m, np.int64)  # how many credible tracks could claim a detection
+    for i in range(n_tracks):
+        if tr.life[i, 2] > 0.0 or 1.0 - tr.weight[i, NOTHING] > 0.5:
+            for e in range(start[i], start[i + 1]):
+                claims[column[e]] += 1
+    elapsed = look.t - tr.last_look[sensor.index]
+    temper = 1.0
+    if sensor.decorrelation > 0.0:
+        temper = min(1.0, max(elapsed, 0.0) / sensor.decorrelation)
+    tr.last_look[sensor.index] = look.t
+    for i in range(n_tracks):
+        if p_d[i] <= 0.0:
+            continue
+        k = col_of_row[i]
+        shy = s.lonely_bearings and not sensor.ranging
+        if shy and start[i + 1] > start[i] and (start[i + 1] - start[i] > 1 or claims[column[start[i]]] > 1):
+            if k >= 0:  # ambiguous: neither evidence nor update
+                row_of_col[k] = -1
+                fate[k] = UNASSOCIATED
+            continue
+        if k >= 0:
+            e = start[i]
+            while column[e] != k:
+                e += 1
+            fate[k] = UPDATED
+            owner[k] = tr.birth[i]
+            nis_of[k] = distance[e]
+            take(tr, i, s, sensor, look, k, loglik[e], p_d[i], temper)
+        else:
+            weigh(tr, i, math.log(1.0 - p_d[i]), math.log(1.0 - p_d[i]), temper)
+    learn_clutter(tr, s, sensor, look, claims, row_of_col, usable)
+    if sensor.ranging:
+        begin(tr, s, sensor, look, fate, owner, row_of_col, usable)
+    end_and_merge(tr, s)
+    tr.count[1] += 1
+
+
+@njit(cache=True)
+def gate_all(
+    tr: Tracks,
+    s: Settings,
+    sensor: SensorTable,
+    look: Look,
+    usable: FloatArray,
+    p_d: FloatArray,
+    fate: IntArray,
+    owner: IntArray,
+    nis_of: FloatArray,
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
+    """Return the candidate list (start, column, cost, NIS, log(likelihood / clutter density)) of all tracks."""
+    n_tracks = tr.count[0]
+    m = len(look.dt)
+    n = tr.x.shape[1]
+    start = np.zeros(n_tracks + 1, np.int64)
+    room = max(64, 4 * (n_tracks + m))
+    column = np.empty(room, np.int64)
+    cost = np.empty(room)
+    distance = np.empty(room)
+    loglik = np.empty(room)
+    zhat = np.empty(7)
+    H = np.zeros((7, n))
+    h6 = np.empty((7, 6))
+    y = np.empty(7)
+    S = np.empty((7, 7))
+    PHt = np.empty((n, 7))
+    mask = np.empty(7, np.int64)
+    near = np.full(m, np.inf)
+    log_density = np.empty(m)
+    for k in range(m):
+        c = components(look.z[k], s.d, mask)
+        log_density[k] = math.log(max(clutter_density(tr, s, sensor, look.z[k], mask, c), 1e-300))
+    used = 0
+    for i in range(n_tracks):
+        start[i] = used
+        if p_d[i] <= 0.0:
+            continue
+        there = 1.0 - tr.weight[i, NOTHING] - tr.weight[i, HIDDEN]
+        p_there = max(min(there, 1.0 - 1e-12), 1e-12)
+        log_hit = math.log(p_there * p_d[i])
+        log_miss = math.log(1.0 - p_there * p_d[i])
+        last_pose = -1
+        for k in range(m):
+            if not usable[k]:
+                continue
+            if last_pose < 0 or look.dt[k] != look.dt[last_pose]:
+                linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, zhat, H, h6)
+                last_pose = k
+            c = components(look.z[k], s.d, mask)
+            if c == 0:
+                continue
+            nis, logdet = innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, c, y, S, PHt)
+            if nis < near[k]:
+                near[k] = nis
+                if nis > s.gates[c]:
+                    fate[k] = GATED
+                    owner[k] = tr.birth[i]
+                    nis_of[k] = nis
+            if nis > s.gates[c]:
+                continue
+            ll = -0.5 * (nis + logdet + c * LOG_2PI) - log_density[k]
+            value = log_miss - (log_hit + ll)
+            if fate[k] == GATED:
+                fate[k] = UNASSOCIATED
+            if used == room:
+                room *= 2
+                column = grown_int(column, room)
+                cost, distance, loglik = grown(cost, room), grown(distance, room), grown(loglik, room)
+            column[used] = k
+            cost[used] = value
+            distance[used] = nis
+            loglik[used] = ll
+            used += 1
+    start[n_tracks] = used
+    return start, column[:used], cost[:used], distance[:used], loglik[:used]
+
+
+@njit(cache=True)
+def grown(a: FloatArray, room: int) -> FloatArray:
+    b = np.empty(room)
+    b[: len(a)] = a
+    return b
+
+
+@njit(cache=True)
+def grown_int(a: IntArray, room: int) -> IntArray:
+    b = np.empty(room, np.int64)
+    b[: len(a)] = a
+    return b
+
+
+@njit(cache=True)
+def weigh(tr: Tracks, i: int, log_visible: float, log_static: float, temper: float) -> None:
+    """Multiply the weights by the likelihoods of the hypotheses (hidden and nothing: 1) and normalise."""
+    w = tr.weight[i]
+    w[VISIBLE] *= math.exp(temper * log_visible)
+    w[STATIC] *= math.exp(temper * log_static)
+    total = w[0] + w[1] + w[2] + w[3]
+    for a in range(4):
+        w[a] /= total
+
+
+@njit(cache=True)
+def take(
+    tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int, loglik: float, p_d: float, temper: float
+) -> None:
+    """Condition track `i` on detection `k`: state, anchor and hypotheses."""
+    n = tr.x.shape[1]
+    zhat = np.empty(7)
+    H = np.zeros((7, n))
+    h6 = np.empty((7, 6))
+    y = np.empty(7)
+    S = np.empty((7, 7))
+    PHt = np.empty((n, 7))
+    mask = np.empty(7, np.int64)
+    linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, zhat, H, h6)
+    c = components(look.z[k], s.d, mask)
+    nis, logdet = innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, c, y, S, PHt)
+    log_visible = math.log(p_d) + loglik
+    log_static = log_visible
+    fix = np.empty(3)
+    fix_R = np.empty((3, 3))
+    J = np.zeros((3, 3))
+    used = np.empty(3, np.int64)
+    if sensor.ranging and world_fix(look, k, s, sensor, fix, fix_R, J, used):
+        moving = moving_likelihood(tr, i, s, sensor, fix, fix_R, J, used)
+        log_static += static_likelihood(tr, i, s, fix, fix_R, True) - moving
+    apply_update(tr.x[i], tr.P[i], y, S, PHt, c)
+    weigh(tr, i, log_visible, log_static, temper)
+    tr.life[i, 1] = look.t + look.dt[k]
+    tr.life[i, 3] += 1.0
+
+
+@njit(cache=True)
+def moving_likelihood(
+    tr: Tracks, i: int, s: Settings, sensor: SensorTable, fix: FloatArray, fix_R: FloatArray, J: FloatArray, mask: IntArray
+) -> float:
+    """Log-likelihood of a world position under the moving track, biases included: the anchor's rival."""
+    d = s.d
+    n = tr.x.shape[1]
+    G = np.zeros((d, n))
+    for a in range(d):
+        G[a, a] = 1.0
+        for e in range(3):
+            if sensor.bias[mask[e]] >= 0:
+                G[a, sensor.bias[mask[e]]] += J[a, e]
+    GP = G @ tr.P[i]
+    L = np.zeros((3, 3))
+    y = np.zeros(3)
+    value = d * LOG_2PI
+    for a in range(d):
+        y[a] = fix[a]
+        for j in range(n):
+            y[a] -= G[a, j] * tr.x[i, j]
+        for b in range(a + 1):
+            acc = fix_R[a, b]
+            for j in range(n):
+                acc += GP[a, j] * G[b, j]
+            for k in range(b):
+                acc -= L[a, k] * L[b, k]
+            L[a, b] = math.sqrt(max(acc, 1e-300)) if a == b else acc / L[b, b]
+        value += 2.0 * math.log(L[a, a])
+    for a in range(d):
+        acc = y[a]
+        for k in range(a):
+            acc -= L[a, k] * y[k]
+        y[a] = acc / L[a, a]
+        value += y[a] * y[a]
+    return -0.5 * value
+
+
+@njit(cache=True)
+def world_fix(
+    look: Look, k: int, s: Settings, sensor: SensorTable, fix: FloatArray, fix_R: FloatArray, J: FloatArray, mask: IntArray
+) -> bool:
+    """Fill a detection's world position (3,) and its white covariance (3, 3); False where it gives no position."""
+    if position_fix(look, k, s, sensor, fix, J, mask) == 0:
+        return False
+    R = np.zeros((3, 3))
+    component_covariance(look, k, s, sensor, mask, R)
+    for a in range(3):
+        for b in range(3):
+            acc = 0.0
+            for e in range(3):
+                for f in range(3):
+                    acc += J[a, e] * R[e, f] * J[b, f]
+            fix_R[a, b] = acc
+    return True
+
+
+@njit(cache=True)
+def component_covariance(look: Look, k: int, s: Settings, sensor: SensorTable, mask: IntArray, R: FloatArray) -> None:
+    """Fill the covariance (3, 3) of the components in `mask`; what is not measured has its prior spread."""
+    for a in range(3):
+        for b in range(3):
+            value = look.R[k, mask[a], mask[b]]
+            R[a, b] = value if math.isfinite(value) else 0.0
+        if not math.isfinite(look.R[k, mask[a], mask[a]]):
+            spread = 500.0
+            if mask[a] == 2:
+                spread = min((sensor.elevation_high - sensor.elevation_low) / math.sqrt(12.0), 0.35)
+            if s.d == 2:
+                spread = 1e-6
+            R[a, a] = spread * spread
+
+
+@njit(cache=True)
+def learn_clutter(
+    tr: Tracks, s: Settings, sensor: SensorTable, look: Look, claims: IntArray, row_of_col: IntArray, usable: FloatArray
+) -> None:
+    """Let the detections that no shown track took teach the mean number of false detections of a look."""
+    known = tr.clutter[sensor.index]
+    m = len(look.dt)
+    forget = 1.0 / s.clutter_memory
+    for b in range(AZIMUTH_BINS + 1):
+        known[b] *= 1.0 - forget
+    floor = 0.05 * sensor.clutter_per_scan
+    for k in range(m):
+        i = row_of_col[k]
+        if math.isfinite(look.z[k, 0]):
+            tr.seen_range[sensor.index] = max(tr.seen_range[sensor.index], look.z[k, 0])
+        if not usable[k]:
+            continue
+        share = 1.0
+        if i < 0 and claims[k] > 0:
+            share = 0.0
+        elif i >= 0:
+            share = tr.weight[i, NOTHING] + tr.weight[i, STATIC] if sensor.ranging else tr.weight[i, NOTHING]
+        if not math.isnan(look.z[k, 1]):
+            known[azimuth_bin(look.z[k, 1])] += forget * share
+        known[AZIMUTH_BINS] += forget * share
+    known[AZIMUTH_BINS] = max(known[AZIMUTH_BINS], floor)
+    for b in range(AZIMUTH_BINS):
+        known[b] = max(known[b], floor / AZIMUTH_BINS)
+
+
+@njit(cache=True)
+def begin(
+    tr: Tracks,
+    s: Settings,
+    sensor: SensorTable,
+    look: Look,
+    fate: IntArray,
+    owner: IntArray,
+    row_of_col: IntArray,
+    usable: FloatArray,
+) -> None:
+    """Begin a track at every detection with a position that no track took."""
+    d = s.d
+    n = tr.x.shape[1]
+    J = np.zeros((3, 3))
+    fix = np.empty(3)
+    mask = np.empty(3, np.int64)
+    R = np.zeros((3, 3))
+    for k in range(len(look.dt)):
+        if not usable[k] or row_of_col[k] >= 0 or position_fix(look, k, s, sensor, fix, J, mask) == 0:
+            continue
+        component_covariance(look, k, s, sensor, mask, R)
+        i = tr.count[0]
+        tr.count[0] += 1
+        x, P = tr.x[i], tr.P[i]
+        x[:] = 0.0
+        P[:, :] = 0.0
+        tr.anchor[i] = 0.0
+        tr.anchor_P[i] = 0.0
+        for j in range(n - 2 * d):
+            P[2 * d + j, 2 * d + j] = s.bias_sigma[j] ** 2
+        for e in range(3):  # position covariance from noise and bias, and what it shares with the bias
+            b = sensor.bias[mask[e]]
+            for a in range(d):
+                if b >= 0:
+                    P[a, b] -= J[a, e] * P[b, b]
+                    P[b, a] = P[a, b]
+        for a in range(d):
+            x[a] = fix[a]
+            tr.anchor[i, a] = fix[a]
+            P[d + a, d + a] = s.speed_sigma**2
+            for b in range(d):
+                acc = 0.0
+                shared = 0.0
+                for e in range(3):
+                    for f in range(3):
+                        acc += J[a, e] * R[e, f] * J[b, f]
+                    bias = sensor.bias[mask[e]]
+                    if bias >= 0:
+                        shared += J[a, e] * P[bias, bias] * J[b, e]
+                P[a, b] = acc + shared
+                tr.anchor_P[i, a, b] = acc
+        density = tr.clutter[sensor.index, AZIMUTH_BINS]
+        born = s.birth_rate / (s.birth_rate + density)
+        w = tr.weight[i]
+        w[VISIBLE] = born * (1.0 - s.static_share)
+        w[HIDDEN] = 0.0
+        w[STATIC] = born * s.static_share
+        w[NOTHING] = 1.0 - born
+        tr.birth[i] = look.row[k]
+        tr.life[i, 0] = look.t + look.dt[k]
+        tr.life[i, 1] = tr.life[i, 0]
+        tr.life[i, 2] = 0.0
+        tr.life[i, 3] = 1.0
+        fate[k] = INITIATED
+        owner[k] = look.row[k]
+        if math.isfinite(look.z[k, 3]):
+            condition_on_rate(tr, i, s, sensor, look, k)
+
+
+@njit(cache=True)
+def condition_on_rate(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int) -> None:
+    """Give a new track what its first range rate tells of the velocity."""
+    n = tr.x.shape[1]
+    zhat = np.empty(7)
+    H = np.zeros((7, n))
+    h6 = np.empty((7, 6))
+    y = np.empty(7)
+    S = np.empty((7, 7))
+    PHt = np.empty((n, 7))
+    mask = np.empty(7, np.int64)
+    mask[0] = 3
+    linearise(tr.x[i], s.d, k, 0.0, look, sensor, zhat, H, h6)
+    innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, 1, y, S, PHt)
+    apply_update(tr.x[i], tr.P[i], y, S, PHt, 1)
+
+
+@njit(cache=True)
+def end_and_merge(tr: Tracks, s: Settings) -> None:
+    """Drop tracks that are probably nothing, and the younger of two that have become one."""
+    keep = np.ones(tr.count[0], np.bool_)
+    d = s.d
+    for i in range(tr.count[0]):
+        w = tr.weight[i]
+        target = w[VISIBLE] + w[HIDDEN]
+        if target + w[STATIC] < s.delete_below:
+            keep[i] = False
+            continue
+        if tr.life[i, 2] > 0.0:
+            if target < s.hide_below:
+                tr.life[i, 2] = 0.0
+        elif target > s.show_above:
+            tr.life[i, 2] = 1.0
+    for i in range(tr.count[0]):
+        if not keep[i] or tr.life[i, 3] < 2.0:
+            continue
+        for j in range(tr.count[0]):
+            if i == j or not keep[j]:
+                continue
+            gap = 0.0
+            for a in range(d):
+                gap += (tr.x[i, a] - tr.x[j, a]) ** 2
+            if gap > s.merge_distance**2 or tr.life[j, 3] < 2.0:
+                continue
+            speed = 0.0
+            spread = 0.0
+            for a in range(d):
+                speed += (tr.x[i, d + a] - tr.x[j, d + a]) ** 2
+                spread += tr.P[i, d + a, d + a] + tr.P[j, d + a, d + a]
+            if speed > 4.0 * spread:
+                continue
+            stronger = tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN] + tr.life[i, 2]
+            if stronger > tr.weight[j, VISIBLE] + tr.weight[j, HIDDEN] + tr.life[j, 2] or (
+                tr.life[i, 0] < tr.life[j, 0] and stronger >= tr.life[j, 2]
+            ):
+                keep[j] = False
+    at = 0
+    for i in range(tr.count[0]):
+        if keep[i]:
+            if at != i:
+                tr.birth[at] = tr.birth[i]
+                tr.x[at] = tr.x[i]
+                tr.P[at] = tr.P[i]
+                tr.weight[at] = tr.weight[i]
+                tr.anchor[at] = tr.anchor[i]
+                tr.anchor_P[at] = tr.anchor_P[i]
+                tr.life[at] = tr.life[i]
+            at += 1
+    tr.count[0] = at

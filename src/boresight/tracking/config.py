@@ -1,0 +1,60 @@
+"""What can be chosen of the tracker. SI and radians."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from boresight.errors import UserError
+
+
+@dataclass(frozen=True, slots=True)
+class SensorErrors:
+    """What a sensor's errors are beyond the white noise that the recording declares.
+
+    A bias that wanders slowly, separately for each target, is a first-order Gauss–Markov process with standard
+    deviation `bias_…` and correlation time `bias_time`; 0 leaves it out.
+    """
+
+    bias_range: float = 0.0  # m
+    bias_azimuth: float = 0.0  # rad
+    bias_elevation: float = 0.0  # rad
+    bias_position: float = 0.0  # m, per axis
+    bias_time: float = 20.0  # s
+    decorrelation: float = 0.0  # s: looks closer in time are not independent evidence that a target exists
+    fade_range: float = float("inf")  # m: where the detection probability has fallen to half
+
+
+@dataclass(frozen=True, slots=True)
+class TrackerConfig:
+    """Settings of the multi-target tracker; None takes the value that fits the recording's dimensions.
+
+    Raises:
+        UserError: a value outside its range, named by its key.
+    """
+
+    q: float | None = None  # m²/s³, white-acceleration power spectral density (2-D: 0.1, 3-D: 1)
+    speed_sigma: float | None = None  # m/s, prior velocity of a new track per axis (2-D: 8, 3-D: 150)
+    gate_probability: float = 0.999
+    birth_rate: float = 0.02  # new targets a look
+    survival_time: float = 120.0  # s
+    hide_time: float = 60.0  # s, mean time for which a target stays visible
+    show_time: float = 10.0  # s, mean time for which it stays hidden
+    static_share: float = 0.3  # of new objects do not move (and are not reported)
+    static_q: float = 0.5  # m²/s, how an object that does not move may still wander
+    confirm_above: float = 0.9  # probability of a moving target above which a track is shown
+    hide_below: float = 0.4  # and below which it is shown no more
+    delete_below: float = 0.001
+    merge_distance: float | None = None  # m (2-D: 10, 3-D: 30)
+    lonely_bearings: bool = True
+    clutter_memory: float = 30.0  # looks
+    window: float | None = None  # s, how late a report may be (None: the largest declared latency + 1 s)
+    sensors: dict[str, SensorErrors] = field(default_factory=dict)  # by sensor id
+
+    def __post_init__(self) -> None:
+        for name in ("survival_time", "hide_time", "show_time", "clutter_memory"):
+            if not getattr(self, name) > 0.0:
+                raise UserError(f"tracker: {name} must be positive")
+        if not 0.5 <= self.gate_probability < 1.0:
+            raise UserError("tracker: gate_probability must lie in [0.5, 1)")
+        if not 0.0 <= self.hide_below <= self.confirm_above <= 1.0:
+            raise UserError("tracker: need 0 <= hide_below <= confirm_above <= 1")

@@ -1,0 +1,148 @@
+"""The in-order tracker: packs configuration for the kernel and steps it scan by scan."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2
+
+from boresight.kernels.tracker import AZIMUTH_BINS, Look, SensorTable, Settings, Tracks
+from boresight.kernels.tracker_scan import scan_step
+from boresight.tracking.config import SensorErrors, TrackerConfig
+from boresight.types import N_COMPONENTS, Component, Sensor, SensorKind
+
+_BIASED = {
+    Component.RANGE: "bias_range",
+    Component.AZIMUTH: "bias_azimuth",
+    Component.ELEVATION: "bias_elevation",
+    Component.EAST: "bias_position",
+    Component.NORTH: "bias_position",
+    Component.UP: "bias_position",
+}
+
+
+class Plan(NamedTuple):
+    """Configuration and sensors as the kernel wants them; made once."""
+
+    settings: Settings
+    sensors: tuple[SensorTable, ...]
+    n_states: int
+
+
+def make_plan(config: TrackerConfig, sensors: tuple[Sensor, ...], dimensions: int) -> Plan:
+    """Pack a configuration for `sensors` in `dimensions` (2 or 3)."""
+    d = dimensions
+    flat = d == 2
+    sigma: list[float] = []
+    tau: list[float] = []
+    tables = []
+    for index, sensor in enumerate(sensors):
+        errors = config.sensors.get(sensor.id, SensorErrors())
+        bias = np.full(N_COMPONENTS, -1, np.int64)
+        for component, key in _BIASED.items():
+            if flat and component in (Component.ELEVATION, Component.UP):
+                continue
+            value = getattr(errors, key)
+            if value > 0.0 and math.isfinite(sensor.sigma[component]):
+                bias[component] = 2 * d + len(sigma)
+                sigma.append(value)
+                tau.append(errors.bias_time)
+        c = sensor.coverage
+        span = c.azimuth[1] - c.azimuth[0]
+        if span <= 0.0:
+            span += 2.0 * math.pi
+        tables.append(
+            SensorTable(
+                index=index,
+                p_detection=min(sensor.p_detection, 0.999),
+                clutter_per_scan=sensor.clutter_per_scan,
+                range_low=c.range[0],
+                range_high=c.range[1],
+                azimuth_low=c.azimuth[0],
+                azimuth_span=min(span, 2.0 * math.pi),
+                elevation_low=c.elevation[0],
+                elevation_high=c.elevation[1],
+                ranging=sensor.kind not in (SensorKind.INFRARED, SensorKind.OPTICAL),
+                bias=bias,
+                decorrelation=errors.decorrelation,
+                fade_range=errors.fade_range,
+            )
+        )
+    gates = np.array([0.0, *chi2.ppf(config.gate_probability, np.arange(1, 8))])
+    settings = Settings(
+        d=d,
+        q=config.q if config.q is not None else (0.1 if flat else 1.0),
+        gates=gates,
+        speed_sigma=config.speed_sigma if config.speed_sigma is not None else (8.0 if flat else 150.0),
+        birth_rate=config.birth_rate,
+        survival_time=config.survival_time,
+        hide_time=config.hide_time,
+        show_time=config.show_time,
+        static_share=config.static_share,
+        static_q=config.static_q,
+        delete_below=config.delete_below,
+        show_above=config.confirm_above,
+        hide_below=config.hide_below,
+        bias_sigma=np.array(sigma),
+        bias_tau=np.array(tau),
+        merge_distance=config.merge_distance if config.merge_distance is not None else (10.0 if flat else 30.0),
+        lonely_bearings=config.lonely_bearings,
+        clutter_memory=config.clutter_memory,
+    )
+    return Plan(settings, tuple(tables), 2 * d + len(sigma))
+
+
+def empty_tracks(plan: Plan, capacity: int = 64) -> Tracks:
+    """Return a table without tracks."""
+    n = plan.n_states
+    clutter = np.zeros((len(plan.sensors), AZIMUTH_BINS + 1))
+    for table in plan.sensors:
+        clutter[table.index, :AZIMUTH_BINS] = table.clutter_per_scan / AZIMUTH_BINS
+        clutter[table.index, AZIMUTH_BINS] = table.clutter_per_scan
+    return Tracks(
+        count=np.zeros(2, np.int64),
+        time=np.full(1, -np.inf),
+        birth=np.zeros(capacity, np.int64),
+        x=np.zeros((capacity, n)),
+        P=np.zeros((capacity, n, n)),
+        weight=np.zeros((capacity, 4)),
+        anchor=np.zeros((capacity, 3)),
+        anchor_P=np.zeros((capacity, 3, 3)),
+        life=np.zeros((capacity, 4)),
+        last_look=np.full(len(plan.sensors), -np.inf),
+        clutter=clutter,
+        seen_range=np.zeros(len(plan.sensors)),
+    )
+
+
+PER_TRACK = ("birth", "x", "P", "weight", "anchor", "anchor_P", "life")
+
+
+def copy_tracks(tr: Tracks, capacity: int | None = None) -> Tracks:
+    """Copy the live rows (and the room for `capacity`, by default as much as there was)."""
+    n = int(tr.count[0])
+    size = len(tr.birth) if capacity is None else capacity
+    parts = {}
+    for name, array in tr._asdict().items():
+        if name in PER_TRACK:
+            fresh = np.zeros((size, *array.shape[1:]), array.dtype)
+            fresh[:n] = array[:n]
+            parts[name] = fresh
+        else:
+            parts[name] = array.copy()
+    return Tracks(**parts)
+
+
+def step(tr: Tracks, plan: Plan, sensor: int, look: Look) -> tuple[Tracks, np.ndarray, np.ndarray, np.ndarray]:
+    """Take one look in order of validity; consumes `tr`. Returns tracks, and per detection: code, owner, NIS."""
+    m = len(look.dt)
+    need = int(tr.count[0]) + m
+    if need > len(tr.birth):
+        tr = copy_tracks(tr, 2 * need)
+    fate = np.zeros(m, np.int64)
+    owner = np.full(m, -1, np.int64)
+    nis = np.full(m, np.nan)
+    scan_step(tr, plan.settings, plan.sensors[sensor], look, fate, owner, nis)
+    return tr, fate, owner, nis

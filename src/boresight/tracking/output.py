@@ -1,0 +1,110 @@
+"""When rows are written, and the prediction of tracks to now."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from boresight.kernels.tracker import Tracks
+from boresight.kernels.tracker import HIDDEN, VISIBLE
+from boresight.tracking.core import Plan
+from boresight.types import FloatArray, TrackStatus
+
+ROW_INTERVAL = 0.1  # s: at most one row a track in this time
+QUIET_INTERVAL = 0.4  # s: spacing of the rows ahead where no report is expected
+GAPS_KEPT = 9
+
+
+@dataclass(slots=True, eq=False)
+class Clock:
+    """What has arrived when: decides at which times rows are due, from the past alone."""
+
+    arrival: float = -np.inf  # s, the newest time of arrival
+    emitted: float = -np.inf  # s, time of the newest row
+    last: dict[int, float] = field(default_factory=dict)  # sensor -> newest arrival
+    gaps: dict[int, list[float]] = field(default_factory=dict)  # sensor -> its last intervals
+
+
+def note_arrival(clock: Clock, sensor: int, t_recv: float) -> None:
+    """Remember that a look of `sensor` has come."""
+    if sensor in clock.last and t_recv > clock.last[sensor]:
+        gaps = clock.gaps.setdefault(sensor, [])
+        gaps.append(t_recv - clock.last[sensor])
+        del gaps[:-GAPS_KEPT]
+    clock.last[sensor] = t_recv
+    clock.arrival = max(clock.arrival, t_recv)
+
+
+def period_of(clock: Clock, sensor: int, declared: float | None) -> float | None:
+    """Return the declared period of a sensor, else the median of its last intervals."""
+    if declared is not None:
+        return declared
+    gaps = clock.gaps.get(sensor)
+    return float(np.median(gaps)) if gaps else None
+
+
+def due_at_arrival(clock: Clock, periods: dict[int, float | None]) -> list[float]:
+    """Return the times of the rows that the newest arrival calls for: now, and ahead while no report is expected.
+
+    The times ahead depend on the past alone, so that a recording that ends here gives the same rows.
+    """
+    now = clock.arrival
+    if now - clock.emitted < ROW_INTERVAL:
+        return []
+    expected = [clock.last[s] + p for s, p in periods.items() if p and s in clock.last and clock.last[s] + p > now]
+    times = [now]
+    if expected:
+        until = min(expected)
+        ahead = now + QUIET_INTERVAL
+        while ahead < until and len(times) < 100:
+            times.append(ahead)
+            ahead += QUIET_INTERVAL
+    clock.emitted = times[-1]
+    return times
+
+
+def due_before(clock: Clock, t_recv: float) -> list[float]:
+    """Return the times at which rows are missing since the last one, when the next arrival comes later than expected."""
+    times = []
+    while np.isfinite(clock.emitted) and clock.emitted + 0.5 < t_recv:
+        clock.emitted += QUIET_INTERVAL
+        times.append(clock.emitted)
+    return times
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """Rows of tracks.parquet as columns; `birth` names the track until it is numbered."""
+
+    t: FloatArray
+    t_known: FloatArray
+    birth: np.ndarray
+    coasting: np.ndarray
+    position: FloatArray  # (n, d)
+    velocity: FloatArray  # (n, d)
+    covariance: FloatArray  # (n, d, d)
+
+
+def rows_at(tr: Tracks, plan: Plan, t: float, t_known: float, coast_after: float) -> Rows | None:
+    """Predict the shown tracks to time `t` (s); None where there is none."""
+    n = int(tr.count[0])
+    shown = np.nonzero(tr.life[:n, 2] > 0.0)[0]
+    if len(shown) == 0:
+        return None
+    d = plan.settings.d
+    dt = max(0.0, t - float(tr.time[0]))
+    x, P = tr.x[shown], tr.P[shown]
+    pos, vel = slice(0, d), slice(d, 2 * d)
+    cross = P[:, pos, vel]
+    covariance = P[:, pos, pos] + dt * (cross + cross.transpose(0, 2, 1)) + dt**2 * P[:, vel, vel]
+    covariance = covariance + np.eye(d) * (plan.settings.q * dt**3 / 3.0)
+    return Rows(
+        t=np.full(len(shown), t),
+        t_known=np.full(len(shown), t_known),
+        birth=tr.birth[shown].copy(),
+        coasting=float(tr.time[0]) - tr.life[shown, 1] > coast_after,
+        position=x[:, pos] + dt * x[:, vel],
+        velocity=x[:, vel].copy(),
+        covariance=covariance,
+    )
