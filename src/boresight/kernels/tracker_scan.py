@@ -141,6 +141,8 @@ def scan_step(
     learn_clutter(tr, s, sensor, look, claims, row_of_col, usable)
     if sensor.ranging:
         begin(tr, s, sensor, look, fate, owner, row_of_col, usable)
+    if sensor.ranging:
+        show(tr, s, sensor, look)
     end_and_merge(tr, s)
     tr.count[1] += 1
 
@@ -185,7 +187,7 @@ def gate_all(
         if p_d[i] <= 0.0:
             continue
         there = 1.0 - tr.weight[i, NOTHING] - tr.weight[i, HIDDEN]
-        p_there = max(min(there, 1.0 - 1e-12), 1e-12)
+        p_there = max(min(there, 1.0 - 1e-9), 0.1)
         log_hit = math.log(p_there * p_d[i])
         log_miss = math.log(1.0 - p_there * p_d[i])
         last_pose = -1
@@ -471,6 +473,22 @@ def condition_on_rate(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look
 
 
 @njit(cache=True)
+def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look) -> None:
+    """Show the tracks that are probably moving targets within the range for which the sensor answers."""
+    last = len(look.dt)
+    for i in range(tr.count[0]):
+        gap = 0.0
+        for a in range(s.d):
+            gap += (tr.x[i, a] - look.sensor_position[last, a]) ** 2
+        target = tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN]
+        if tr.life[i, 2] > 0.0:
+            if gap > (1.1 * sensor.report_range) ** 2:
+                tr.life[i, 2] = 0.0
+        elif target > s.show_above and gap < sensor.report_range**2:
+            tr.life[i, 2] = 1.0
+
+
+@njit(cache=True)
 def end_and_merge(tr: Tracks, s: Settings) -> None:
     """Drop tracks that are probably nothing, and the younger of two that have become one."""
     keep = np.ones(tr.count[0], np.bool_)
@@ -481,11 +499,8 @@ def end_and_merge(tr: Tracks, s: Settings) -> None:
         if target + w[STATIC] < s.delete_below:
             keep[i] = False
             continue
-        if tr.life[i, 2] > 0.0:
-            if target < s.hide_below:
-                tr.life[i, 2] = 0.0
-        elif target > s.show_above:
-            tr.life[i, 2] = 1.0
+        if target < s.hide_below:
+            tr.life[i, 2] = 0.0
     for i in range(tr.count[0]):
         if not keep[i] or tr.life[i, 3] < 2.0:
             continue

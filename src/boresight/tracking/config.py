@@ -22,6 +22,7 @@ class SensorErrors:
     bias_time: float = 20.0  # s
     decorrelation: float = 0.0  # s: looks closer in time are not independent evidence that a target exists
     fade_range: float = float("inf")  # m: where the detection probability has fallen to half
+    report_range: float = float("inf")  # m: farther targets are tracked but not shown (ranging sensors)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +44,7 @@ class TrackerConfig:
     static_q: float = 0.5  # m²/s, how an object that does not move may still wander
     confirm_above: float = 0.9  # probability of a moving target above which a track is shown
     hide_below: float = 0.4  # and below which it is shown no more
-    delete_below: float = 0.001
+    delete_below: float = 1e-4
     merge_distance: float | None = None  # m (2-D: 10, 3-D: 30)
     lonely_bearings: bool = True
     clutter_memory: float = 30.0  # looks

@@ -68,6 +68,7 @@ def make_plan(config: TrackerConfig, sensors: tuple[Sensor, ...], dimensions: in
                 bias=bias,
                 decorrelation=errors.decorrelation,
                 fade_range=errors.fade_range,
+                report_range=errors.report_range,
             )
         )
     gates = np.array([0.0, *chi2.ppf(config.gate_probability, np.arange(1, 8))])
