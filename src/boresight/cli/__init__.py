@@ -21,6 +21,8 @@ app = App(
 # One line a command: module:function, and the sentence that `boresight --help` shows.
 COMMANDS: dict[str, tuple[str, str]] = {
     "import": ("boresight.cli.import_:app", "Turn other formats into a recording."),
+    "track": ("boresight.cli.track:track", "Track the targets of a recording."),
+    "score": ("boresight.cli.score:score_command", "Score tracks against the truth of their recording."),
     "info": ("boresight.cli.info:info", "Say what is in a recording."),
     "export": ("boresight.cli.export:export", "Write tracks as CSV, GeoJSON or KML."),
     "paper": ("boresight.cli.paper:app", "Print a paper's table: as printed, corrected, and ours."),

@@ -35,10 +35,10 @@ def autoferry(
     force
         Replace the output folder.
     """
-    from boresight.io.autoferry import import_autoferry
+    from boresight.io.autoferry import TRACKER_TOML, import_autoferry
 
     check_output(output, force)
-    _finish(import_autoferry(detections, truth, ignore), output, force)
+    _finish(import_autoferry(detections, truth, ignore), output, force, {"tracker.toml": TRACKER_TOML})
 
 
 @app.command
@@ -78,7 +78,7 @@ def csv(
     _finish(import_csv(detections, sensors, platform, truth, ignore), output, force)
 
 
-def _finish(recording: Recording, output: Path, force: bool) -> None:
-    write_recording(recording, output, force)
+def _finish(recording: Recording, output: Path, force: bool, extras: dict[str, str] | None = None) -> None:
+    write_recording(recording, output, force, extras)
     n, twins = len(recording.detections), int(recording.duplicates.sum())
     print(f"wrote {output}: {n} rows of {len(recording.sensors)} sensors ({twins} duplicates)")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ class PoseTrack:
     Attributes:
         id: the platform.
         t: (n,) stamps of positions (s); `position`, `velocity` (n, 3) in the site's ENU (m, m/s).
-        hermite: (n - 1,) whether both ends of a segment have a measured velocity.
+        measured: (n,) whether the velocity was given (else it is a slope); `hermite` (n - 1,) whether both ends were.
         t_attitude: (m,) stamps of attitudes (s), empty if there are none; `quaternion` (m, 4) of enu_from_body;
             `steps` (m - 1, 3) the turn from each to the next (rad, body axes).
         max_extrapolation: how far before the first and after the last stamp an answer is given (s).
@@ -38,6 +38,7 @@ class PoseTrack:
     t: FloatArray
     position: FloatArray
     velocity: FloatArray
+    measured: NDArray[np.bool_]
     hermite: NDArray[np.bool_]
     t_attitude: FloatArray
     quaternion: FloatArray
@@ -73,6 +74,25 @@ class PoseTrack:
         if times.ndim == 0:
             return Pose(times, position[0], velocity[0], R[0])
         return Pose(times, position, velocity, R)
+
+    def until(self, t: float) -> PoseTrack:
+        """Return what was known of the platform at time `t` (s): the stamps up to it, and slopes from these alone."""
+        n = int(np.searchsorted(self.t, t, side="right"))
+        m = int(np.searchsorted(self.t_attitude, t, side="right"))
+        if n == len(self.t) and m == len(self.t_attitude):
+            return self
+        velocity = self.velocity[:n]
+        recent = int(np.searchsorted(self.t, t - SLOPE_WINDOW))
+        if not self.measured[recent:n].all():
+            first = int(np.searchsorted(self.t, t - 3.0 * SLOPE_WINDOW))
+            slopes = kernel.slopes(self.t[first:n], self.position[first:n], SLOPE_WINDOW)
+            velocity = velocity.copy()
+            velocity[recent:] = np.where(self.measured[recent:n, None], velocity[recent:], slopes[recent - first :])
+        return replace(
+            self, t=self.t[:n], position=self.position[:n], velocity=velocity, measured=self.measured[:n],
+            hermite=self.hermite[: max(n - 1, 0)], t_attitude=self.t_attitude[:m], quaternion=self.quaternion[:m],
+            steps=self.steps[: max(m - 1, 0)],
+        )  # fmt: skip
 
     def body_rate(self, t: ArrayLike) -> FloatArray:
         """Return the turn rate (n, 3) at `t` (n,) in body axes (rad/s): constant between attitude stamps."""
@@ -139,7 +159,7 @@ def pose_track(
     t_attitude = np.ascontiguousarray(platform.t[turned])
     quaternion = _attitudes(platform.ypr[turned], t_attitude, t, position, velocity, site)
     return PoseTrack(
-        platform.id, t, position, velocity, measured[1:] & measured[:-1], t_attitude, quaternion,
+        platform.id, t, position, velocity, measured, measured[1:] & measured[:-1], t_attitude, quaternion,
         rotations.steps_between(quaternion), max_extrapolation, max_gap, site,
     )  # fmt: skip
 

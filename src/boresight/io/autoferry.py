@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from boresight.errors import UserError
-from boresight.io.declaration import Declaration, SensorTable, SiteTable, sensor_of, site_of
+from boresight.io.declaration import CoverageTable, Declaration, SensorTable, SiteTable, sensor_of, site_of
 from boresight.io.detections import REQUIRED, SCHEMA
 from boresight.io.files import read_text
 from boresight.io.paths import IGNORE_SCHEMA, TRUTH_SCHEMA
@@ -35,40 +35,72 @@ SENSORS: dict[int, SensorTable] = {
         period_s=0.5,
         p_detection=0.7,
         clutter_per_scan=1.0,
+        coverage=CoverageTable(range_m=(0.0, 120.0)),
     ),
     2: SensorTable(
         id="radar",
         kind="radar",
         platform=PLATFORM,
         axes="platform_enu",
-        sigma_position_m=4.0,
+        sigma_position_m=3.0,
         latency_s=2.0,
         period_s=1.68,
         p_detection=0.8,
         clutter_per_scan=3.0,
+        coverage=CoverageTable(range_m=(0.0, 700.0)),
     ),
     3: SensorTable(
         id="ir",
         kind="infrared",
         platform=PLATFORM,
         axes="platform_enu",
-        sigma_azimuth_deg=1.0,
+        sigma_azimuth_deg=0.5,
         period_s=0.117,
         p_detection=0.6,
-        clutter_per_scan=4.0,
+        clutter_per_scan=2.0,
     ),
     4: SensorTable(
         id="eo",
         kind="optical",
         platform=PLATFORM,
         axes="platform_enu",
-        sigma_azimuth_deg=1.0,
+        sigma_azimuth_deg=0.5,
         period_s=0.2,
-        p_detection=0.6,
-        clutter_per_scan=6.0,
+        p_detection=0.5,
+        clutter_per_scan=3.0,
     ),
 }
 RANGING = (1, 2)
+# The errors beyond white noise, and where the sensors answer for what is there: one set for every scenario.
+TRACKER_TOML = """\
+# Settings for the Autoferry sensor suite, one set for all scenarios; `boresight track` uses this file unless --config
+# names another.
+[tracker]
+hide_below = 0.6
+
+[[sensor]]
+id = "radar"
+bias_position_m = 2.0
+bias_time_s = 20.0
+report_range_m = 300.0
+
+[[sensor]]
+id = "lidar"
+bias_position_m = 0.8
+bias_time_s = 20.0
+
+[[sensor]]
+id = "ir"
+bias_azimuth_deg = 1.5
+bias_time_s = 15.0
+decorrelation_s = 2.0
+
+[[sensor]]
+id = "eo"
+bias_azimuth_deg = 1.5
+bias_time_s = 15.0
+decorrelation_s = 2.0
+"""
 
 
 def import_autoferry(detections: Path, truth: Path | None = None, ignore: Path | None = None) -> Recording:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -85,8 +86,13 @@ def check_navigation(
             )
 
 
-def write_recording(recording: Recording, path: Path | str, force: bool = False) -> None:
-    """Write a recording folder at once or not at all; an existing one needs `force`. Raises UserError."""
+def write_recording(
+    recording: Recording, path: Path | str, force: bool = False, extras: Mapping[str, str] | None = None
+) -> None:
+    """Write a recording folder at once or not at all; an existing one needs `force`. Raises UserError.
+
+    `extras` are further text files by name, such as the tracker.toml that suits the recording's sensors.
+    """
     with output_folder(path, force) as folder:
         declared = Declaration(recording.name, recording.dimensions, recording.site, recording.sensors)
         (folder / "recording.toml").write_text(write_declaration(declared), encoding="utf-8")
@@ -95,5 +101,7 @@ def write_recording(recording: Recording, path: Path | str, force: bool = False)
             write_table(folder / "platform.parquet", paths.platform_columns(recording.platforms))
         if recording.truth:
             write_table(folder / "truth.parquet", paths.truth_columns(recording.truth))
+        for name, text in (extras or {}).items():
+            (folder / name).write_text(text, encoding="utf-8")
         if recording.ignore:
             write_table(folder / "ignore.parquet", paths.ignore_columns(recording.ignore))

@@ -27,9 +27,9 @@ AZIMUTH_BINS = 120
 
 
 class Tracks(NamedTuple):
-    """All live tracks, structure of arrays; the first `count[0]` rows are in use."""
+    """All live tracks, structure of arrays; the first `live[0]` rows are in use."""
 
-    count: IntArray  # (2,) live tracks; scans so far
+    live: IntArray  # (2,) live tracks; scans so far
     time: FloatArray  # (1,) s, the one time to which all tracks are predicted
     birth: IntArray  # (cap,) row of the detection that began the track: its lasting name
     x: FloatArray  # (cap, n)
@@ -59,7 +59,7 @@ class Look(NamedTuple):
 class SensorTable(NamedTuple):
     """What the kernel knows of the sensor that looked."""
 
-    index: int
+    number: int  # its place among the recording's sensors
     p_detection: float
     clutter_per_scan: float
     range_low: float
@@ -117,7 +117,7 @@ def predict_all(tr: Tracks, s: Settings, t: float) -> None:
     settle = 1.0 - math.exp(-dt * rate)
     to_hidden = settle / (s.hide_time * rate)
     to_visible = settle / (s.show_time * rate)
-    for i in range(tr.count[0]):
+    for i in range(tr.live[0]):
         x = tr.x[i]
         P = tr.P[i]
         for a in range(d):
@@ -192,7 +192,15 @@ def volume_of(mask: IntArray, m: int, sensor: SensorTable, range_high: float, d:
 
 @njit(cache=True)
 def linearise(
-    x: FloatArray, d: int, k: int, dt: float, look: Look, sensor: SensorTable, z: FloatArray, H: FloatArray, h6: FloatArray
+    x: FloatArray,
+    d: int,
+    k: int,
+    dt: float,
+    look: Look,
+    sensor: SensorTable,
+    z: FloatArray,
+    H: FloatArray,
+    h6: FloatArray,
 ) -> None:
     """Fill `z` (7,) and `H` (7, n) for a track's state `x` seen with the pose of detection `k`, `dt` after the look."""
     position = np.zeros(3)

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from boresight.kernels.assignment import assign_sparse
+from boresight.kernels.measurement import measure
 from boresight.kernels.tracker import (
     AZIMUTH_BINS,
     GATED,
@@ -34,7 +35,6 @@ from boresight.kernels.tracker import (
     static_likelihood,
     volume_of,
 )
-from boresight.kernels.measurement import measure
 from boresight.types.sensor import FloatArray
 
 LOG_2PI = math.log(2.0 * math.pi)
@@ -49,8 +49,8 @@ def azimuth_bin(azimuth: float) -> int:
 @njit(cache=True)
 def clutter_density(tr: Tracks, s: Settings, sensor: SensorTable, z: FloatArray, mask: IntArray, m: int) -> float:
     """Expected false detections per unit volume of the measured components around `z`, as learned so far."""
-    known = tr.clutter[sensor.index]
-    high = sensor.range_high if math.isfinite(sensor.range_high) else max(tr.seen_range[sensor.index], 100.0)
+    known = tr.clutter[sensor.number]
+    high = sensor.range_high if math.isfinite(sensor.range_high) else max(tr.seen_range[sensor.number], 100.0)
     volume = volume_of(mask, m, sensor, high, s.d, s.speed_sigma)
     if sensor.ranging:
         return known[AZIMUTH_BINS] / volume
@@ -61,7 +61,9 @@ def clutter_density(tr: Tracks, s: Settings, sensor: SensorTable, z: FloatArray,
 
 
 @njit(cache=True)
-def detection_probability(tr: Tracks, i: int, s: Settings, look: Look, sensor: SensorTable, z: FloatArray, h6: FloatArray) -> float:
+def detection_probability(
+    tr: Tracks, i: int, s: Settings, look: Look, sensor: SensorTable, z: FloatArray, h6: FloatArray
+) -> float:
     """Probability that the sensor, looking once, reports a visible target where track `i` is; 0 outside coverage."""
     m = len(look.dt)
     position = np.zeros(3)
@@ -87,7 +89,7 @@ def scan_step(
     """
     predict_all(tr, s, look.t)
     m = len(look.dt)
-    n_tracks = tr.count[0]
+    n_tracks = tr.live[0]
     usable = np.zeros(m, np.bool_)
     for k in range(m):
         fate[k] = UNASSOCIATED
@@ -113,11 +115,11 @@ def scan_step(
         if tr.life[i, 2] > 0.0 or 1.0 - tr.weight[i, NOTHING] > 0.5:
             for e in range(start[i], start[i + 1]):
                 claims[column[e]] += 1
-    elapsed = look.t - tr.last_look[sensor.index]
+    elapsed = look.t - tr.last_look[sensor.number]
     temper = 1.0
     if sensor.decorrelation > 0.0:
         temper = min(1.0, max(elapsed, 0.0) / sensor.decorrelation)
-    tr.last_look[sensor.index] = look.t
+    tr.last_look[sensor.number] = look.t
     for i in range(n_tracks):
         if p_d[i] <= 0.0:
             continue
@@ -144,7 +146,7 @@ def scan_step(
     if sensor.ranging:
         show(tr, s, sensor, look)
     end_and_merge(tr, s)
-    tr.count[1] += 1
+    tr.live[1] += 1
 
 
 @njit(cache=True)
@@ -160,7 +162,7 @@ def gate_all(
     nis_of: FloatArray,
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
     """Return the candidate list (start, column, cost, NIS, log(likelihood / clutter density)) of all tracks."""
-    n_tracks = tr.count[0]
+    n_tracks = tr.live[0]
     m = len(look.dt)
     n = tr.x.shape[1]
     start = np.zeros(n_tracks + 1, np.int64)
@@ -266,7 +268,7 @@ def take(
     mask = np.empty(7, np.int64)
     linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, zhat, H, h6)
     c = components(look.z[k], s.d, mask)
-    nis, logdet = innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, c, y, S, PHt)
+    innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, c, y, S, PHt)
     log_visible = math.log(p_d) + loglik
     log_static = log_visible
     fix = np.empty(3)
@@ -284,7 +286,14 @@ def take(
 
 @njit(cache=True)
 def moving_likelihood(
-    tr: Tracks, i: int, s: Settings, sensor: SensorTable, fix: FloatArray, fix_R: FloatArray, J: FloatArray, mask: IntArray
+    tr: Tracks,
+    i: int,
+    s: Settings,
+    sensor: SensorTable,
+    fix: FloatArray,
+    fix_R: FloatArray,
+    J: FloatArray,
+    mask: IntArray,
 ) -> float:
     """Log-likelihood of a world position under the moving track, biases included: the anchor's rival."""
     d = s.d
@@ -322,7 +331,14 @@ def moving_likelihood(
 
 @njit(cache=True)
 def world_fix(
-    look: Look, k: int, s: Settings, sensor: SensorTable, fix: FloatArray, fix_R: FloatArray, J: FloatArray, mask: IntArray
+    look: Look,
+    k: int,
+    s: Settings,
+    sensor: SensorTable,
+    fix: FloatArray,
+    fix_R: FloatArray,
+    J: FloatArray,
+    mask: IntArray,
 ) -> bool:
     """Fill a detection's world position (3,) and its white covariance (3, 3); False where it gives no position."""
     if position_fix(look, k, s, sensor, fix, J, mask) == 0:
@@ -360,7 +376,7 @@ def learn_clutter(
     tr: Tracks, s: Settings, sensor: SensorTable, look: Look, claims: IntArray, row_of_col: IntArray, usable: FloatArray
 ) -> None:
     """Let the detections that no shown track took teach the mean number of false detections of a look."""
-    known = tr.clutter[sensor.index]
+    known = tr.clutter[sensor.number]
     m = len(look.dt)
     forget = 1.0 / s.clutter_memory
     for b in range(AZIMUTH_BINS + 1):
@@ -369,7 +385,7 @@ def learn_clutter(
     for k in range(m):
         i = row_of_col[k]
         if math.isfinite(look.z[k, 0]):
-            tr.seen_range[sensor.index] = max(tr.seen_range[sensor.index], look.z[k, 0])
+            tr.seen_range[sensor.number] = max(tr.seen_range[sensor.number], look.z[k, 0])
         if not usable[k]:
             continue
         share = 1.0
@@ -407,8 +423,8 @@ def begin(
         if not usable[k] or row_of_col[k] >= 0 or position_fix(look, k, s, sensor, fix, J, mask) == 0:
             continue
         component_covariance(look, k, s, sensor, mask, R)
-        i = tr.count[0]
-        tr.count[0] += 1
+        i = tr.live[0]
+        tr.live[0] += 1
         x, P = tr.x[i], tr.P[i]
         x[:] = 0.0
         P[:, :] = 0.0
@@ -437,7 +453,7 @@ def begin(
                         shared += J[a, e] * P[bias, bias] * J[b, e]
                 P[a, b] = acc + shared
                 tr.anchor_P[i, a, b] = acc
-        density = tr.clutter[sensor.index, AZIMUTH_BINS]
+        density = tr.clutter[sensor.number, AZIMUTH_BINS]
         born = s.birth_rate / (s.birth_rate + density)
         w = tr.weight[i]
         w[VISIBLE] = born * (1.0 - s.static_share)
@@ -476,7 +492,7 @@ def condition_on_rate(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look
 def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look) -> None:
     """Show the tracks that are probably moving targets within the range for which the sensor answers."""
     last = len(look.dt)
-    for i in range(tr.count[0]):
+    for i in range(tr.live[0]):
         gap = 0.0
         for a in range(s.d):
             gap += (tr.x[i, a] - look.sensor_position[last, a]) ** 2
@@ -491,9 +507,9 @@ def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look) -> None:
 @njit(cache=True)
 def end_and_merge(tr: Tracks, s: Settings) -> None:
     """Drop tracks that are probably nothing, and the younger of two that have become one."""
-    keep = np.ones(tr.count[0], np.bool_)
+    keep = np.ones(tr.live[0], np.bool_)
     d = s.d
-    for i in range(tr.count[0]):
+    for i in range(tr.live[0]):
         w = tr.weight[i]
         target = w[VISIBLE] + w[HIDDEN]
         if target + w[STATIC] < s.delete_below:
@@ -501,10 +517,10 @@ def end_and_merge(tr: Tracks, s: Settings) -> None:
             continue
         if target < s.hide_below:
             tr.life[i, 2] = 0.0
-    for i in range(tr.count[0]):
+    for i in range(tr.live[0]):
         if not keep[i] or tr.life[i, 3] < 2.0:
             continue
-        for j in range(tr.count[0]):
+        for j in range(tr.live[0]):
             if i == j or not keep[j]:
                 continue
             gap = 0.0
@@ -525,7 +541,7 @@ def end_and_merge(tr: Tracks, s: Settings) -> None:
             ):
                 keep[j] = False
     at = 0
-    for i in range(tr.count[0]):
+    for i in range(tr.live[0]):
         if keep[i]:
             if at != i:
                 tr.birth[at] = tr.birth[i]
@@ -536,4 +552,4 @@ def end_and_merge(tr: Tracks, s: Settings) -> None:
                 tr.anchor_P[at] = tr.anchor_P[i]
                 tr.life[at] = tr.life[i]
             at += 1
-    tr.count[0] = at
+    tr.live[0] = at

@@ -48,6 +48,7 @@ class TrackerConfig:
     merge_distance: float | None = None  # m (2-D: 10, 3-D: 30)
     lonely_bearings: bool = True
     clutter_memory: float = 30.0  # looks
+    coast_after: float = 4.0  # s without a hit after which a shown track counts as coasting
     window: float | None = None  # s, how late a report may be (None: the largest declared latency + 1 s)
     sensors: dict[str, SensorErrors] = field(default_factory=dict)  # by sensor id
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -31,8 +32,10 @@ class Plan(NamedTuple):
     n_states: int
 
 
-def make_plan(config: TrackerConfig, sensors: tuple[Sensor, ...], dimensions: int) -> Plan:
-    """Pack a configuration for `sensors` in `dimensions` (2 or 3)."""
+def make_plan(
+    config: TrackerConfig, sensors: tuple[Sensor, ...], dimensions: int, used: Sequence[int] | None = None
+) -> Plan:
+    """Pack a configuration for `sensors` in `dimensions` (2 or 3); biases are planned for those in `used` (all)."""
     d = dimensions
     flat = d == 2
     sigma: list[float] = []
@@ -45,7 +48,8 @@ def make_plan(config: TrackerConfig, sensors: tuple[Sensor, ...], dimensions: in
             if flat and component in (Component.ELEVATION, Component.UP):
                 continue
             value = getattr(errors, key)
-            if value > 0.0 and math.isfinite(sensor.sigma[component]):
+            wanted = used is None or index in used
+            if wanted and value > 0.0 and math.isfinite(sensor.sigma[component]):
                 bias[component] = 2 * d + len(sigma)
                 sigma.append(value)
                 tau.append(errors.bias_time)
@@ -55,7 +59,7 @@ def make_plan(config: TrackerConfig, sensors: tuple[Sensor, ...], dimensions: in
             span += 2.0 * math.pi
         tables.append(
             SensorTable(
-                index=index,
+                number=index,
                 p_detection=min(sensor.p_detection, 0.999),
                 clutter_per_scan=sensor.clutter_per_scan,
                 range_low=c.range[0],
@@ -100,10 +104,10 @@ def empty_tracks(plan: Plan, capacity: int = 64) -> Tracks:
     n = plan.n_states
     clutter = np.zeros((len(plan.sensors), AZIMUTH_BINS + 1))
     for table in plan.sensors:
-        clutter[table.index, :AZIMUTH_BINS] = table.clutter_per_scan / AZIMUTH_BINS
-        clutter[table.index, AZIMUTH_BINS] = table.clutter_per_scan
+        clutter[table.number, :AZIMUTH_BINS] = table.clutter_per_scan / AZIMUTH_BINS
+        clutter[table.number, AZIMUTH_BINS] = table.clutter_per_scan
     return Tracks(
-        count=np.zeros(2, np.int64),
+        live=np.zeros(2, np.int64),
         time=np.full(1, -np.inf),
         birth=np.zeros(capacity, np.int64),
         x=np.zeros((capacity, n)),
@@ -123,7 +127,7 @@ PER_TRACK = ("birth", "x", "P", "weight", "anchor", "anchor_P", "life")
 
 def copy_tracks(tr: Tracks, capacity: int | None = None) -> Tracks:
     """Copy the live rows (and the room for `capacity`, by default as much as there was)."""
-    n = int(tr.count[0])
+    n = int(tr.live[0])
     size = len(tr.birth) if capacity is None else capacity
     parts = {}
     for name, array in tr._asdict().items():
@@ -139,7 +143,7 @@ def copy_tracks(tr: Tracks, capacity: int | None = None) -> Tracks:
 def step(tr: Tracks, plan: Plan, sensor: int, look: Look) -> tuple[Tracks, np.ndarray, np.ndarray, np.ndarray]:
     """Take one look in order of validity; consumes `tr`. Returns tracks, and per detection: code, owner, NIS."""
     m = len(look.dt)
-    need = int(tr.count[0]) + m
+    need = int(tr.live[0]) + m
     if need > len(tr.birth):
         tr = copy_tracks(tr, 2 * need)
     fate = np.zeros(m, np.int64)

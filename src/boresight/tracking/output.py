@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from boresight.kernels.tracker import Tracks
-from boresight.kernels.tracker import HIDDEN, VISIBLE
 from boresight.tracking.core import Plan
-from boresight.types import FloatArray, TrackStatus
+from boresight.types import FloatArray
 
 ROW_INTERVAL = 0.1  # s: at most one row a track in this time
 QUIET_INTERVAL = 0.4  # s: spacing of the rows ahead where no report is expected
@@ -65,7 +64,7 @@ def due_at_arrival(clock: Clock, periods: dict[int, float | None]) -> list[float
 
 
 def due_before(clock: Clock, t_recv: float) -> list[float]:
-    """Return the times at which rows are missing since the last one, when the next arrival comes later than expected."""
+    """Return the times at which rows are missing since the last one, the next arrival having been late."""
     times = []
     while np.isfinite(clock.emitted) and clock.emitted + 0.5 < t_recv:
         clock.emitted += QUIET_INTERVAL
@@ -88,7 +87,7 @@ class Rows:
 
 def rows_at(tr: Tracks, plan: Plan, t: float, t_known: float, coast_after: float) -> Rows | None:
     """Predict the shown tracks to time `t` (s); None where there is none."""
-    n = int(tr.count[0])
+    n = int(tr.live[0])
     shown = np.nonzero(tr.life[:n, 2] > 0.0)[0]
     if len(shown) == 0:
         return None

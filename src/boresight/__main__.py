@@ -1,0 +1,5 @@
+"""`python -m boresight`."""
+
+from boresight.cli import main
+
+main()

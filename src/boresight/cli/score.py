@@ -1,0 +1,88 @@
+"""`boresight score`: tracks against truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from boresight.cli.output import print_json, print_table
+from boresight.io.recording import read_recording
+from boresight.io.results import read_results
+from boresight.metrics.score import CUT_OFF, score
+from boresight.types import Recording, Results
+
+SETS = {
+    "item": "",
+    "gospa_rms_m": "GOSPA\nRMS m",
+    "gospa_mean_m": "mean\nm",
+    "gospa_localisation_m": "local.\nm",
+    "gospa_missed_m": "missed\nm",
+    "gospa_false_m": "false\nm",
+    "ospa_mean_m": "OSPA\nmean m",
+    "tracked_fraction": "tracked",
+    "position_rmse_m": "RMSE\nm",
+}
+LIVES = {
+    "item": "",
+    "identity_switches": "identity\nswitches",
+    "breaks": "breaks",
+    "false_track_s": "false-track\nseconds",
+    "nees_mean": "NEES\nmean",
+    "nees_median": "NEES\nmedian",
+    "nees_in_band_95": "NEES in\n95 % band",
+}
+TARGETS = {
+    "target": "target",
+    "tracked_fraction": "tracked",
+    "position_rmse_m": "RMSE\nm",
+    "identity_switches": "identity\nswitches",
+    "breaks": "breaks",
+    "nees_mean": "NEES\nmean",
+    "nees_in_band_95": "NEES in\n95 % band",
+}
+SENSORS = {
+    "sensor": "sensor",
+    "reports": "reports",
+    "reports_updated": "updated",
+    "reports_initiated": "initi-\nated",
+    "nis_per_dof": "NIS per\ncomponent",
+    "nis_in_band_95": "NIS in\n95 % band",
+}
+
+
+def score_command(out: Path, rec: Path, /, *, json: bool = False) -> None:
+    """Score tracks against the truth of their recording: GOSPA, OSPA, tracked fraction, identities, NEES, NIS.
+
+    Parameters
+    ----------
+    out
+        Folder of the results (boresight track -o).
+    rec
+        Folder of the recording, with truth.
+    json
+        Print one JSON object instead of tables.
+    """
+    recording = read_recording(rec)
+    results = read_results(out)
+    rows = score_rows(recording, results)
+    if json:
+        parameters = {
+            "results": str(out),
+            "recording": str(rec),
+            "cut_off_m": CUT_OFF,
+            "p": 2,
+            "alpha": 2,
+            "clock_step_s": 0.5,
+        }
+        print_json("score", parameters, rows)
+        return
+    sets = [r for r in rows if r["item"] in ("tracks", "empty tracker")]
+    print_table(SETS, sets, title=f"GOSPA and OSPA with p = 2, alpha = 2, c = {CUT_OFF:g} m, every 0.5 s")
+    print_table(LIVES, sets)
+    print_table(TARGETS, [r for r in rows if r["item"] == "target"])
+    print_table(SENSORS, [r for r in rows if r["item"] == "sensor"])
+
+
+def score_rows(recording: Recording, results: Results) -> list[dict[str, Any]]:
+    """Return the rows of `boresight score --json`: what the report shows too."""
+    return score(recording, results.tracks, results.decisions, results.summary.get("sensors")).rows

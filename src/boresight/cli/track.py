@@ -1,0 +1,197 @@
+"""`boresight track`: a recording to tracks."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import importlib.util
+import shlex
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from boresight._version import __version__
+from boresight.cli.output import print_json
+from boresight.config.tracker import parameters_of, read_tracker_config
+from boresight.errors import UserError
+from boresight.io.files import check_output, output_folder
+from boresight.io.recording import read_recording
+from boresight.io.results import write_results
+from boresight.io.scans import iter_scans, selected
+from boresight.tracking.config import TrackerConfig
+from boresight.types import FATES, DecisionRows, Recording, Results, Scan
+
+BESIDE = "tracker.toml"  # a configuration that lies in the recording's folder is used unless --config names another
+
+
+def track(
+    rec: Path,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    sensors: str | None = None,
+    config: Path | None = None,
+    force: bool = False,
+    report: bool = True,
+    json: bool = False,
+) -> None:
+    """Track the targets of a recording; writes tracks.parquet, decisions.parquet, summary.json and report.html.
+
+    Parameters
+    ----------
+    rec
+        Folder of the recording.
+    output
+        Folder for the results.
+    sensors
+        Sensors to use, separated by commas (all).
+    config
+        TOML with the tracker's settings (tracker.toml in the recording's folder if there is one, else defaults).
+    force
+        Replace the output folder.
+    report
+        Write report.html too (--no-report leaves it out).
+    json
+        Print one JSON object instead of a line.
+    """
+    check_output(output, force)
+    recording = read_recording(rec)
+    ids = [s.strip() for s in sensors.split(",") if s.strip()] if sensors is not None else None
+    if ids == []:
+        raise UserError("--sensors names no sensor; give ids separated by commas")
+    selected(recording, ids)
+    source = config if config is not None else (rec / BESIDE if (rec / BESIDE).is_file() else None)
+    known = [s.id for s in recording.sensors]
+    settings = TrackerConfig() if source is None else read_tracker_config(source, known)
+    results = track_recording(recording, settings, ids)
+    command = ["boresight", "track", str(rec), "-o", str(output)]
+    command += ["--sensors", ",".join(ids)] if ids else []
+    command += ["--config", str(config)] if config else []
+    results.summary["command"] = shlex.join(command)
+    results.summary["config_file"] = None if source is None else str(source)
+    with output_folder(output, force) as folder:
+        write_results(results, recording, folder)
+        if report:
+            _write_report(folder, results, recording)
+    counts = results.summary["counts"]
+    row = {"output": str(output), **counts, "seconds": results.summary["seconds"]}
+    if json:
+        print_json("track", {"recording": str(rec), "sensors": ids}, [row])
+    else:
+        print(
+            f"wrote {output}: {counts['tracks']} tracks, {counts['rows']} rows, from {counts['reports']} reports "
+            f"in {results.summary['seconds']:.2f} s"
+        )
+
+
+def track_recording(recording: Recording, config: TrackerConfig, sensors: list[str] | None = None) -> Results:
+    """Track a recording in memory, with a progress bar on standard error where that is a terminal."""
+    with _loading():
+        from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
+        from boresight.tracking.warm import warm
+
+        warm(recording.dimensions)
+    tracker = tracker_for(recording, config, sensors)
+    scans = list(iter_scans(recording, sensors))
+    started = time.perf_counter()
+    with _progress(len(scans)) as tick:
+        state, rows, decisions = run(tracker, scans, progress=tick)
+    seconds = time.perf_counter() - started
+    tracks = track_rows(rows, state.names)
+    fates = decision_rows(recording, tracker, decisions, state.names)
+    summary: dict[str, Any] = {
+        "version": __version__,
+        "sensors": [recording.sensors[i].id for i in tracker.used],
+        "counts": {
+            "reports": len(recording.detections),
+            "scans": len(scans),
+            "tracks": len(state.names),
+            "rows": len(tracks),
+            "fates": _fates(fates),
+        },
+        "seconds": seconds,
+        "t_first_s": float(recording.detections.t.min()),
+        "t_last_s": float(recording.detections.t.max()),
+        "window_s": tracker.length,
+        "parameters": parameters_of(config),
+        "versions": versions(),
+    }
+    return Results(tracks, fates, summary)
+
+
+def _fates(rows: DecisionRows) -> dict[str, int]:
+    counted = Counter(rows.fate.tolist())
+    return {str(FATES[code]): n for code, n in sorted(counted.items())}
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of what the numbers depend on."""
+    import numba
+    import numpy
+    import scipy
+
+    python = ".".join(str(v) for v in sys.version_info[:3])
+    return {
+        "boresight": __version__,
+        "python": python,
+        "numpy": numpy.__version__,
+        "scipy": scipy.__version__,
+        "numba": numba.__version__,
+    }
+
+
+@contextlib.contextmanager
+def _loading() -> Iterator[None]:
+    """Say that kernels are loaded, and that the first run compiles them, while that goes on."""
+    from boresight.tracking.cache import compiled
+
+    ready = compiled()
+    if not ready:
+        print(
+            "boresight: compiling kernels, on the first run only (about half a minute) …", file=sys.stderr, flush=True
+        )
+    started = time.perf_counter()
+    yield
+    if not ready:
+        print(f"boresight: compiled in {time.perf_counter() - started:.0f} s", file=sys.stderr, flush=True)
+
+
+@contextlib.contextmanager
+def _progress(total: int) -> Iterator[Callable[[Scan], None] | None]:
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn("tracking"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]} scans/s"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("tracking", total=total, rate="…")
+        done = 0
+        started = time.perf_counter()
+
+        def tick(_: Scan) -> None:
+            nonlocal done
+            done += 1
+            if done % 50 == 0 or done == total:
+                rate = done / max(time.perf_counter() - started, 1e-9)
+                progress.update(task, completed=done, rate=f"{rate:,.0f}")
+
+        yield tick
+
+
+def _write_report(folder: Path, results: Results, recording: Recording) -> None:
+    if importlib.util.find_spec("boresight.report.html") is None:
+        return
+    importlib.import_module("boresight.report.html").write_report(folder / "report.html", results, recording)

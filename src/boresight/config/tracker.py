@@ -1,0 +1,138 @@
+"""tracker.toml: units in the keys, unknown keys named, to `tracking.TrackerConfig`."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
+
+from boresight.errors import UserError, did_you_mean
+from boresight.io.toml import TableModel, convert, read_toml
+from boresight.tracking.config import SensorErrors, TrackerConfig
+
+DEG = math.pi / 180.0
+# key in the file -> (field, factor to SI)
+TRACKER_KEYS = {
+    "process_noise_m2_s3": ("q", 1.0),
+    "speed_sigma_m_s": ("speed_sigma", 1.0),
+    "gate_probability": ("gate_probability", 1.0),
+    "birth_rate": ("birth_rate", 1.0),
+    "survival_time_s": ("survival_time", 1.0),
+    "hide_time_s": ("hide_time", 1.0),
+    "show_time_s": ("show_time", 1.0),
+    "static_share": ("static_share", 1.0),
+    "static_wander_m2_s": ("static_q", 1.0),
+    "confirm_above": ("confirm_above", 1.0),
+    "hide_below": ("hide_below", 1.0),
+    "delete_below": ("delete_below", 1.0),
+    "merge_distance_m": ("merge_distance", 1.0),
+    "lonely_bearings": ("lonely_bearings", 1.0),
+    "clutter_memory_looks": ("clutter_memory", 1.0),
+    "coast_after_s": ("coast_after", 1.0),
+    "window_s": ("window", 1.0),
+}
+SENSOR_KEYS = {
+    "bias_range_m": ("bias_range", 1.0),
+    "bias_azimuth_deg": ("bias_azimuth", DEG),
+    "bias_elevation_deg": ("bias_elevation", DEG),
+    "bias_position_m": ("bias_position", 1.0),
+    "bias_time_s": ("bias_time", 1.0),
+    "decorrelation_s": ("decorrelation", 1.0),
+    "fade_range_m": ("fade_range", 1.0),
+    "report_range_m": ("report_range", 1.0),
+}
+
+
+class TrackerTable(TableModel, frozen=True):
+    """`[tracker]`; what is left out takes the default of `TrackerConfig`."""
+
+    process_noise_m2_s3: float | None = None
+    speed_sigma_m_s: float | None = None
+    gate_probability: float | None = None
+    birth_rate: float | None = None
+    survival_time_s: float | None = None
+    hide_time_s: float | None = None
+    show_time_s: float | None = None
+    static_share: float | None = None
+    static_wander_m2_s: float | None = None
+    confirm_above: float | None = None
+    hide_below: float | None = None
+    delete_below: float | None = None
+    merge_distance_m: float | None = None
+    lonely_bearings: bool | None = None
+    clutter_memory_looks: float | None = None
+    coast_after_s: float | None = None
+    window_s: float | None = None
+
+
+class ErrorsTable(TableModel, frozen=True):
+    """One `[[sensor]]`: errors beyond the white noise that the recording declares."""
+
+    id: str
+    bias_range_m: float | None = None
+    bias_azimuth_deg: float | None = None
+    bias_elevation_deg: float | None = None
+    bias_position_m: float | None = None
+    bias_time_s: float | None = None
+    decorrelation_s: float | None = None
+    fade_range_m: float | None = None
+    report_range_m: float | None = None
+
+
+class ConfigTable(TableModel, frozen=True):
+    """The whole file."""
+
+    tracker: TrackerTable = TrackerTable()
+    sensor: tuple[ErrorsTable, ...] = ()
+
+
+def read_tracker_config(path: Path, sensor_ids: list[str]) -> TrackerConfig:
+    """Read a tracker configuration for a recording with these sensors; raises UserError with file and key."""
+    table = convert(read_toml(path), ConfigTable, str(path))
+    sensors = {}
+    for item in table.sensor:
+        if item.id not in sensor_ids:
+            raise UserError(
+                f"{path}: sensor '{item.id}' is not in the recording{did_you_mean(item.id, sensor_ids)}; "
+                f"it has {', '.join(sensor_ids)}"
+            )
+        if item.id in sensors:
+            raise UserError(f"{path}: sensor '{item.id}' stands twice")
+        sensors[item.id] = SensorErrors(**_values(item, SENSOR_KEYS, f"{path}: sensor['{item.id}']"))
+    values = _values(table.tracker, TRACKER_KEYS, f"{path}: tracker")
+    try:
+        return TrackerConfig(**values, sensors=sensors)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
+
+
+def _values(table: TableModel, keys: dict[str, tuple[str, float]], where: str) -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    for key, (name, factor) in keys.items():
+        value = getattr(table, key)
+        if value is None:
+            continue
+        if not isinstance(value, bool):
+            if not value >= 0.0:
+                raise UserError(f"{where}: {key}: {value} is negative")
+            value = value * factor
+        out[name] = value
+    return out
+
+
+def parameters_of(config: TrackerConfig) -> dict[str, Any]:
+    """Return the settings with the keys and units of the file, for summaries; None where the default depends."""
+
+    def table(item: Any, keys: dict[str, tuple[str, float]]) -> dict[str, Any]:
+        out = {}
+        for key, (name, factor) in keys.items():
+            value = getattr(item, name)
+            out[key] = value if value is None or isinstance(value, bool) else value / factor
+        return out
+
+    assert {f.name for f in dataclasses.fields(SensorErrors)} == {name for name, _ in SENSOR_KEYS.values()}
+    return {
+        "tracker": table(config, TRACKER_KEYS),
+        "sensor": [{"id": key, **table(value, SENSOR_KEYS)} for key, value in config.sensors.items()],
+    }

@@ -1,0 +1,66 @@
+"""Targets and tracks on the clock on which they are scored."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from boresight.types import FloatArray, Ignore, TrackRows, Truth
+
+STEP = 0.5  # s
+MAX_AGE = 2.0  # s: a row older than this says nothing about now
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sampled:
+    """One target or track on the clock: (n,) whether it is there, (n, d) position (m), and for tracks covariance."""
+
+    name: str | int
+    present: NDArray[np.bool_]
+    position: FloatArray
+    covariance: FloatArray | None = None
+
+
+def clock_of(first: float, last: float) -> FloatArray:
+    """Return the times (s) from the first to the last detection in steps of 0.5 s."""
+    steps = int(np.floor((last - first) / STEP + 1e-9))
+    return first + STEP * np.arange(steps + 1)
+
+
+def sample_truth(truth: Truth, clock: FloatArray, d: int) -> Sampled:
+    """Interpolate a true path linearly; it is there from its first to its last stamp, and half a step beyond."""
+    present = (clock >= truth.t[0] - STEP) & (clock <= truth.t[-1] + STEP)
+    return Sampled(truth.target, present, _interpolate(clock, truth.t, truth.position[:, :d]))
+
+
+def sample_tracks(rows: TrackRows, clock: FloatArray, d: int) -> list[Sampled]:
+    """Give each track its latest row not older than 2 s, moved by its own velocity."""
+    order = np.lexsort((rows.t_known, rows.t, rows.track_id))
+    ids = rows.track_id[order]
+    cuts = np.flatnonzero(np.r_[True, ids[1:] != ids[:-1], True]) if len(ids) else np.zeros(1, np.int64)
+    out = []
+    for begin, end in itertools.pairwise(cuts.tolist()):
+        mine = order[begin:end]
+        t = rows.t[mine]
+        at = np.searchsorted(t, clock, side="right") - 1
+        row = mine[np.maximum(at, 0)]
+        age = clock - rows.t[row]
+        present = (at >= 0) & (age <= MAX_AGE)
+        position = rows.position[row, :d] + age[:, None] * rows.velocity[row, :d]
+        out.append(Sampled(int(ids[begin]), present, position, rows.covariance[row, :d, :d]))
+    return out
+
+
+def sample_ignored(ignored: Ignore, clock: FloatArray) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
+    """Return whether an object without truth is there, its position (n, 2) and the radius (n,) around it (m)."""
+    present = (clock >= ignored.t[0]) & (clock <= ignored.t[-1])
+    radius = np.interp(clock, ignored.t, ignored.radius)
+    return present, _interpolate(clock, ignored.t, ignored.position), radius
+
+
+def _interpolate(clock: FloatArray, t: FloatArray, x: FloatArray) -> FloatArray:
+    out: FloatArray = np.stack([np.interp(clock, t, x[:, k]) for k in range(x.shape[1])], axis=1)
+    return out

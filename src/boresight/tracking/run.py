@@ -1,0 +1,109 @@
+"""A whole recording through the tracker."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from boresight.frames.pose import pose_track
+from boresight.tracking.config import TrackerConfig
+from boresight.tracking.output import Rows
+from boresight.tracking.tracker import REASON, Decision, Tracker, TrackerState, track_ids
+from boresight.types import (
+    FATES,
+    NO_TRACK,
+    STATUSES,
+    DecisionRows,
+    Fate,
+    Recording,
+    Scan,
+    TrackRows,
+    TrackStatus,
+    no_tracks,
+)
+
+NAVIGATION_GAP = 10.0  # s without navigation data over which a pose is still interpolated
+NAVIGATION_AHEAD = 5.0  # s beyond the ends over which it is still extrapolated
+
+
+def tracker_for(recording: Recording, config: TrackerConfig, sensors: Sequence[str] | None = None) -> Tracker:
+    """Return a tracker for a recording; `sensors` are the ids to use (all)."""
+    poses = {
+        p.id: pose_track(p, max_extrapolation=NAVIGATION_AHEAD, max_gap=NAVIGATION_GAP) for p in recording.platforms
+    }
+    use = None if sensors is None else tuple(sorted(recording.sensor_index(name) for name in sensors))
+    return Tracker(config, recording.sensors, recording.dimensions, poses, use)
+
+
+def run(
+    tracker: Tracker,
+    scans: Iterable[Scan],
+    state: TrackerState | None = None,
+    *,
+    finish: bool = True,
+    progress: Callable[[Scan], None] | None = None,
+) -> tuple[TrackerState, list[Rows], list[Decision]]:
+    """Step a tracker through scans in order of arrival, from `state` (a fresh one); consumes it."""
+    state = tracker.init() if state is None else state
+    rows: list[Rows] = []
+    decisions: list[Decision] = []
+    for scan in scans:
+        state, out = tracker.step(state, scan)
+        rows += out.rows
+        decisions += out.decisions
+        if progress is not None:
+            progress(scan)
+    if finish:
+        state, out = tracker.finish(state)
+        rows += out.rows
+        decisions += out.decisions
+    return state, rows, decisions
+
+
+def track_rows(rows: Sequence[Rows], names: dict[int, int]) -> TrackRows:
+    """Join rows to the columns of tracks.parquet; positions in 2-D have NaN for up."""
+    if not rows:
+        return no_tracks()
+    d = rows[0].position.shape[1]
+    n = sum(len(r.t) for r in rows)
+    position, velocity, covariance = np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan)
+    position[:, :d] = np.concatenate([r.position for r in rows])
+    velocity[:, :d] = np.concatenate([r.velocity for r in rows])
+    covariance[:, :d, :d] = np.concatenate([r.covariance for r in rows])
+    coasting = np.concatenate([r.coasting for r in rows])
+    confirmed, coasts = STATUSES.index(TrackStatus.CONFIRMED), STATUSES.index(TrackStatus.COASTING)
+    return TrackRows(
+        t=np.concatenate([r.t for r in rows]),
+        t_known=np.concatenate([r.t_known for r in rows]),
+        track_id=track_ids(np.concatenate([r.birth for r in rows]), names),
+        status=np.where(coasting, coasts, confirmed).astype(np.uint8),
+        position=position,
+        velocity=velocity,
+        covariance=covariance,
+    )
+
+
+def decision_rows(
+    recording: Recording, tracker: Tracker, decisions: Sequence[Decision], names: dict[int, int]
+) -> DecisionRows:
+    """Give every row of the recording its fate, in file order, those that never reached the tracker included."""
+    n = len(recording.detections)
+    code = {fate: FATES.index(fate) for fate in FATES}
+    fate = np.full(n, code[Fate.NOT_SELECTED], np.uint8)
+    reason = np.full(n, "its sensor was left out", dtype=object)
+    used = np.isin(recording.detections.sensor, tracker.used)
+    duplicate = recording.duplicates & used
+    fate[duplicate] = code[Fate.DUPLICATE]
+    reason[duplicate] = "the same row stands earlier"
+    birth = np.full(n, -1, np.int64)
+    nis = np.full(n, np.nan)
+    for d in decisions:
+        fate[d.row] = code[d.fate]
+        reason[d.row] = REASON.get(d.fate)
+        birth[d.row] = d.birth
+        nis[d.row] = d.nis
+    ids = track_ids(birth, names)
+    never = (birth >= 0) & (ids == NO_TRACK)
+    reason[never & np.isin(fate, [code[Fate.UPDATED], code[Fate.INITIATED]])] = "the track was never confirmed"
+    return DecisionRows(np.arange(n), fate, ids, nis, reason)

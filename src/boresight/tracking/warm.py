@@ -1,0 +1,24 @@
+"""Load (or compile) the tracker's kernels before they are needed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from boresight.tracking.config import TrackerConfig
+from boresight.tracking.tracker import Tracker
+from boresight.types import Component, Scan, Sensor, SensorKind
+
+
+def warm(dimensions: int) -> None:
+    """Take one look through a tracker of `dimensions`, so that its kernels are compiled and loaded."""
+    sigma = np.full(7, np.nan)
+    sigma[[Component.RANGE, Component.AZIMUTH]] = 1.0, 0.01
+    tracker = Tracker(TrackerConfig(), (Sensor("warm", SensorKind.RADAR, sigma=sigma),), dimensions)
+    state = tracker.init()
+    z = np.full((1, 7), np.nan)
+    z[0, [Component.RANGE, Component.AZIMUTH]] = 1000.0, 0.0
+    R = np.full((1, 7, 7), np.nan)
+    R[0, :2, :2] = np.diag([1.0, 1e-4])
+    for k in range(2):
+        t = float(k)
+        state, _ = tracker.step(state, Scan(0, t, t, np.array([t]), z, R, np.array([k])))
