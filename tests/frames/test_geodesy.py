@@ -145,3 +145,17 @@ def test_scalars_and_arrays_agree_bit_for_bit() -> None:
 def test_bad_input_is_told(function: object, values: tuple[float, ...], says: str) -> None:
     with pytest.raises(UserError, match=says):
         function(*values)  # type: ignore[operator]
+
+
+def test_sine_and_cosine_are_those_of_the_library() -> None:
+    from boresight.kernels.trig import sincos
+
+    rng = np.random.default_rng(9)
+    angles = np.concatenate(
+        [rng.uniform(-7, 7, 20000), rng.uniform(-1e6, 1e6, 2000), np.arange(-8, 9) * np.pi / 4, [1e7, 0.0]]
+    )
+    ours = np.array([sincos(float(a)) for a in angles])
+    # one unit in the last place of either, also close to a zero
+    np.testing.assert_allclose(ours[:, 0], np.sin(angles), rtol=3e-16, atol=0)
+    np.testing.assert_allclose(ours[:, 1], np.cos(angles), rtol=3e-16, atol=0)
+    assert np.isnan(sincos(np.inf)).all()

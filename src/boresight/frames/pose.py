@@ -151,7 +151,7 @@ def pose_track(
         raise UserError(f"platform '{platform.id}': times must ascend ({after:.6f} s stands after {before:.6f} s)")
     t = np.ascontiguousarray(platform.t[have])
     position = np.ascontiguousarray(platform.position[have])
-    measured: NDArray[np.bool_] = np.isfinite(platform.velocity[have]).all(axis=1)
+    measured: NDArray[np.bool_] = np.asarray(np.isfinite(platform.velocity[have]).all(axis=1))
     velocity = platform.velocity[have].copy()
     if not measured.all():
         velocity[~measured] = kernel.slopes(t, position, SLOPE_WINDOW)[~measured]

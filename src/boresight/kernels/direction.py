@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from boresight.kernels.geodesy import Arrays, Triple
+from boresight.kernels.trig import LARGEST, sincos, sincos_of_small
 from boresight.types.sensor import FloatArray
 
 
@@ -24,8 +25,10 @@ def azel_from_enu(east: float, north: float, up: float) -> Triple:
 @njit(cache=True)
 def enu_from_azel(azimuth: float, elevation: float, range_m: float) -> Triple:
     """Return east, north, up (m) of azimuth, elevation (rad) and range (m)."""
-    rho = range_m * math.cos(elevation)
-    return rho * math.sin(azimuth), rho * math.cos(azimuth), range_m * math.sin(elevation)
+    sa, ca = sincos(azimuth)
+    se, ce = sincos(elevation)
+    rho = range_m * ce
+    return rho * sa, rho * ca, range_m * se
 
 
 @njit(cache=True)
@@ -41,8 +44,20 @@ def azel_from_enu_many(east: FloatArray, north: FloatArray, up: FloatArray) -> A
 def enu_from_azel_many(azimuth: FloatArray, elevation: FloatArray, range_m: FloatArray) -> Arrays:
     """Apply `enu_from_azel` to columns (n,)."""
     east, north, up = np.empty_like(azimuth), np.empty_like(azimuth), np.empty_like(azimuth)
+    small = True
     for i in range(len(azimuth)):
-        east[i], north[i], up[i] = enu_from_azel(azimuth[i], elevation[i], range_m[i])
+        small &= abs(azimuth[i]) < LARGEST and abs(elevation[i]) < LARGEST
+    if not small:
+        for i in range(len(azimuth)):
+            east[i], north[i], up[i] = enu_from_azel(azimuth[i], elevation[i], range_m[i])
+        return east, north, up
+    for i in range(len(azimuth)):  # the same without a branch, for vector instructions
+        sa, ca = sincos_of_small(azimuth[i])
+        se, ce = sincos_of_small(elevation[i])
+        rho = range_m[i] * ce
+        east[i] = rho * sa
+        north[i] = rho * ca
+        up[i] = range_m[i] * se
     return east, north, up
 
 

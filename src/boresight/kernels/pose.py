@@ -8,13 +8,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from boresight.kernels import geodesy
+from boresight.kernels import geodesy, rotation
 from boresight.types.sensor import FloatArray
 
 _ecef_from_enu = geodesy.ecef_from_enu
 _geodetic_from_ecef = geodesy.geodetic_from_ecef
 _ecef_from_enu_rotation = geodesy.ecef_from_enu_rotation
 _fill_rotation = geodesy.fill_ecef_from_enu
+_fill_matrix = rotation.fill_matrix
 
 
 @njit(cache=True)
@@ -88,9 +89,7 @@ def interpolate_attitude(
                 w * dy - x * dz + y * dw + z * dx,
                 w * dz + x * dy - y * dx + z * dw,
             )
-        R[k, 0, 0], R[k, 0, 1], R[k, 0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
-        R[k, 1, 0], R[k, 1, 1], R[k, 1, 2] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
-        R[k, 2, 0], R[k, 2, 1], R[k, 2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+        _fill_matrix(w, x, y, z, R[k])
     return R, rate
 
 

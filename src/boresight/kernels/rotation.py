@@ -56,16 +56,18 @@ def quaternion_from_ypr(yaw: float, pitch: float, roll: float) -> FloatArray:
 def matrix_from_quaternion(q: FloatArray) -> FloatArray:
     """Return the rotation (3, 3) of a quaternion (4,); NaN where its norm is not one within 1e-6."""
     R = np.empty((3, 3))
-    norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
-    if not abs(math.sqrt(norm2) - 1.0) <= UNIT_TOLERANCE:
-        R[:] = math.nan
-        return R
-    k = 2.0 / norm2
-    w, x, y, z = q[0], q[1], q[2], q[3]
+    fill_matrix(q[0], q[1], q[2], q[3], R)
+    return R
+
+
+@njit(cache=True)
+def fill_matrix(w: float, x: float, y: float, z: float, R: FloatArray) -> None:
+    """Fill `R` (3, 3) with the rotation of the quaternion (w, x, y, z); NaN where its norm is not one."""
+    norm2 = w * w + x * x + y * y + z * z
+    k = 2.0 / norm2 if abs(math.sqrt(norm2) - 1.0) <= UNIT_TOLERANCE else math.nan
     R[0, 0], R[0, 1], R[0, 2] = 1.0 - k * (y * y + z * z), k * (x * y - w * z), k * (x * z + w * y)
     R[1, 0], R[1, 1], R[1, 2] = k * (x * y + w * z), 1.0 - k * (x * x + z * z), k * (y * z - w * x)
     R[2, 0], R[2, 1], R[2, 2] = k * (x * z - w * y), k * (y * z + w * x), 1.0 - k * (x * x + y * y)
-    return R
 
 
 @njit(cache=True)

@@ -12,7 +12,7 @@ from boresight.types.sensor import FloatArray
 _matrix_from_ypr = one.matrix_from_ypr
 _ypr_from_matrix = one.ypr_from_matrix
 _quaternion_from_ypr = one.quaternion_from_ypr
-_matrix_from_quaternion = one.matrix_from_quaternion
+_fill_matrix = one.fill_matrix
 _quaternion_from_matrix = one.quaternion_from_matrix
 _multiply = one.multiply
 _slerp = one.slerp
@@ -52,7 +52,7 @@ def matrix_from_quaternion(q: FloatArray) -> FloatArray:
     """Return rotations (n, 3, 3) of quaternions (n, 4)."""
     out = np.empty((len(q), 3, 3))
     for i in range(len(q)):
-        out[i] = _matrix_from_quaternion(q[i])
+        _fill_matrix(q[i, 0], q[i, 1], q[i, 2], q[i, 3], out[i])
     return out
 
 
