@@ -21,6 +21,7 @@ app = App(
 # One line a command: module:function, and the sentence that `boresight --help` shows.
 COMMANDS: dict[str, tuple[str, str]] = {
     "import": ("boresight.cli.import_:app", "Turn other formats into a recording."),
+    "simulate": ("boresight.cli.simulate:simulate", "Turn a scenario into a recording with truth."),
     "track": ("boresight.cli.track:track", "Track the targets of a recording."),
     "score": ("boresight.cli.score:score_command", "Score tracks against the truth of their recording."),
     "info": ("boresight.cli.info:info", "Say what is in a recording."),
