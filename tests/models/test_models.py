@@ -8,12 +8,16 @@ from scipy.linalg import expm
 
 from boresight.errors import UserError
 from boresight.models import (
+    CoordinatedTurn,
     Infrared,
+    KnownTurn,
     NearlyConstantAcceleration,
+    NearlyConstantJerk,
     NearlyConstantVelocity,
     Position,
     Radar,
     SensorPose,
+    Singer,
 )
 
 
@@ -27,7 +31,9 @@ def van_loan(A: np.ndarray, G: np.ndarray, dt: float) -> tuple[np.ndarray, np.nd
 
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("dt", [0.0, 0.02, 1.7])
-@pytest.mark.parametrize(("model", "order"), [(NearlyConstantVelocity, 1), (NearlyConstantAcceleration, 2)])
+@pytest.mark.parametrize(
+    ("model", "order"), [(NearlyConstantVelocity, 1), (NearlyConstantAcceleration, 2), (NearlyConstantJerk, 3)]
+)
 def test_chain_of_integrators_is_exact(model: type, order: int, d: int, dt: float) -> None:
     motion = model(q=0.7, dimensions=d)
     A = np.kron(np.eye(order + 1, k=1), np.eye(d))
@@ -37,6 +43,53 @@ def test_chain_of_integrators_is_exact(model: type, order: int, d: int, dt: floa
     np.testing.assert_allclose(motion.F(x, dt), F, atol=1e-13)
     np.testing.assert_allclose(motion.Q(x, dt), Q, atol=1e-13)
     np.testing.assert_allclose(motion.transition(x, dt), F @ x, atol=1e-12)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("dt", [0.0, 0.02, 1.7, 60.0])
+@pytest.mark.parametrize("tau", [0.5, 20.0, 1e5])
+def test_singer_is_exact(d: int, dt: float, tau: float) -> None:
+    motion = Singer(tau=tau, sigma=3.0, dimensions=d)
+    A = np.kron(np.eye(3, k=1) - np.diag([0, 0, 1 / tau]), np.eye(d))
+    G = np.kron(np.diag([0.0, 0.0, 2 * 9.0 / tau]), np.eye(d))
+    F, Q = van_loan(A, G, min(dt, 1.7))  # the oracle loses digits over long intervals: chain it
+    if dt == 60.0:
+        F1, Q1, F, Q = F, Q, np.eye(3 * d), np.zeros((3 * d, 3 * d))
+        F1, Q1 = van_loan(A, G, 1.0)
+        for _ in range(60):
+            F, Q = F1 @ F, F1 @ Q @ F1.T + Q1
+    x = np.arange(1.0, 3 * d + 1)
+    np.testing.assert_allclose(motion.F(x, dt), F, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(motion.Q(x, dt), Q, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("rate", [0.3, -1e-7, 0.0, 2.0])
+@pytest.mark.parametrize("dt", [0.0, 0.02, 1.7])
+def test_known_turn_is_exact(d: int, rate: float, dt: float) -> None:
+    motion = KnownTurn(rate=rate, q=0.7, dimensions=d)
+    A = np.kron(np.eye(2, k=1), np.eye(d))
+    A[d, d + 1], A[d + 1, d] = -rate, rate
+    G = np.kron(np.diag([0.0, 0.7]), np.eye(d))
+    F, Q = van_loan(A, G, dt)
+    x = np.arange(1.0, 2 * d + 1)
+    np.testing.assert_allclose(motion.F(x, dt), F, atol=1e-12)
+    np.testing.assert_allclose(motion.Q(x, dt), Q, atol=1e-12)
+
+
+@pytest.mark.parametrize("rate", [0.4, 1e-5, 0.0])
+def test_estimated_turn(rate: float) -> None:
+    """The mean is that of the known turn, F its derivative, and Q what a fine chain of small steps adds up to."""
+    motion, dt = CoordinatedTurn(q=0.5, q_rate=0.01), 1.2
+    x = np.array([100.0, 50, 20, 30, -10, 2, rate])
+    np.testing.assert_allclose(motion.transition(x, dt)[:6], KnownTurn(rate, 0.5).transition(x[:6], dt), rtol=1e-12)
+    numeric = np.array([(motion.transition(x + s, dt) - motion.transition(x - s, dt)) / 2e-5 for s in 1e-5 * np.eye(7)])
+    np.testing.assert_allclose(motion.F(x, dt), numeric.T, rtol=1e-6, atol=1e-6)
+    Q, here = np.zeros((7, 7)), x
+    for _ in range(400):
+        here, F, step = motion.move(here, dt / 400)
+        Q = F @ Q @ F.T + step
+    np.testing.assert_allclose(motion.Q(x, dt), Q, rtol=1e-6, atol=1e-8)
 
 
 TURNED = SensorPose(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,24 +14,25 @@ Moved = tuple[FloatArray, FloatArray, FloatArray]
 
 
 class KernelMotion:
-    """The one abstract level of motion models: name a kernel (see kernels.motion) and its parameters.
+    """The one abstract level of motion models: name a kernel (see kernels.motion), its parameters, and the layout.
 
-    A subclass is final: a frozen dataclass with `dimensions`, `state_dimension`, `parameters` (float64) and `kernel`,
-    a staticmethod of an `@njit` function `kernel(x, dt, parameters, x_out, F, Q)`.
+    A subclass is final: a frozen dataclass with `dimensions`, `layout`, `kernel` (a staticmethod of an `@njit`
+    function `kernel(x, dt, parameters, x_out, F, Q)`), whose `__post_init__` sets `parameters` by `set_parameters`.
     """
 
     kernel: ClassVar[Callable[..., Any]]
+    layout: ClassVar[tuple[str, ...]]  # blocks of the state: vectors of length `dimensions`, or scalars ("turn_rate")
     dimensions: int
+    parameters: FloatArray  # what the kernel wants to know
+
+    def set_parameters(self, *values: float) -> None:
+        """Keep what the kernel wants to know as one float64 array."""
+        object.__setattr__(self, "parameters", np.array(values, dtype=float))
 
     @property
     def state_dimension(self) -> int:
         """Length n of the state."""
-        raise NotImplementedError
-
-    @cached_property
-    def parameters(self) -> FloatArray:
-        """What the kernel wants to know, as one array."""
-        raise NotImplementedError
+        return sum(1 if block in SCALARS else self.dimensions for block in self.layout)
 
     def move(self, x: FloatArray, dt: float) -> Moved:
         """Return the moved mean (n,), F (n, n) and Q (n, n); raises UserError where `x` has another length."""
@@ -55,3 +55,6 @@ class KernelMotion:
     def Q(self, x: FloatArray, dt: float) -> FloatArray:
         """Return the covariance (n, n) that the process noise adds over `dt` (s)."""
         return self.move(x, dt)[2]
+
+
+SCALARS = frozenset({"turn_rate"})

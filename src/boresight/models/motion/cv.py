@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
-import numpy as np
-
-from boresight.kernels.motion import white_derivative
+from boresight.kernels.motion import CHAIN, move
 from boresight.models import check
 from boresight.models.motion.base import KernelMotion
-from boresight.types.sensor import FloatArray
 
 
 @dataclass(frozen=True)
@@ -22,21 +18,13 @@ class NearlyConstantVelocity(KernelMotion):
 
     q: float
     dimensions: int = 3
-    kernel = staticmethod(white_derivative)
+    kernel = staticmethod(move)
+    layout = ("position", "velocity")
 
     def __post_init__(self) -> None:
         check.positive("q", self.q)
         check.spatial(self.dimensions)
-
-    @property
-    def state_dimension(self) -> int:
-        """Length of the state: position and velocity."""
-        return 2 * self.dimensions
-
-    @cached_property
-    def parameters(self) -> FloatArray:
-        """Dimensions, order, q."""
-        return np.array([self.dimensions, 1.0, self.q])
+        self.set_parameters(CHAIN, self.dimensions, 1, self.q)
 
 
 @dataclass(frozen=True)
@@ -48,18 +36,28 @@ class NearlyConstantAcceleration(KernelMotion):
 
     q: float
     dimensions: int = 3
-    kernel = staticmethod(white_derivative)
+    kernel = staticmethod(move)
+    layout = ("position", "velocity", "acceleration")
 
     def __post_init__(self) -> None:
         check.positive("q", self.q)
         check.spatial(self.dimensions)
+        self.set_parameters(CHAIN, self.dimensions, 2, self.q)
 
-    @property
-    def state_dimension(self) -> int:
-        """Length of the state: position, velocity and acceleration."""
-        return 3 * self.dimensions
 
-    @cached_property
-    def parameters(self) -> FloatArray:
-        """Dimensions, order, q."""
-        return np.array([self.dimensions, 2.0, self.q])
+@dataclass(frozen=True)
+class NearlyConstantJerk(KernelMotion):
+    """White snap of power spectral density `q` (m²/s⁷): state (position, velocity, acceleration, jerk).
+
+    Raises UserError for `q` that is not positive or `dimensions` other than 2 and 3.
+    """
+
+    q: float
+    dimensions: int = 3
+    kernel = staticmethod(move)
+    layout = ("position", "velocity", "acceleration", "jerk")
+
+    def __post_init__(self) -> None:
+        check.positive("q", self.q)
+        check.spatial(self.dimensions)
+        self.set_parameters(CHAIN, self.dimensions, 3, self.q)
