@@ -1,0 +1,250 @@
+"""Interacting multiple models of unequal dimension: mixing, and whole streams in one call.
+
+Models are packed to the largest dimension N: means (r, N), covariances (r, N, N), sizes (r,), and `labels` (r, N) that
+name each component, so that components of one name are mixed with each other. A model that lacks a component takes
+part with the mixing model's own belief of it (Yuan, Bar-Shalom, Willett 2012: unbiased mixing).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit, types
+
+from boresight.kernels.gaussian import joseph_update, sandwich
+from boresight.kernels.observation import IntArray
+from boresight.kernels.signatures import MATRIX, MOTION, OBSERVATION, STACK, VECTOR
+from boresight.types.sensor import FloatArray
+
+INTS = types.int64[::1]
+INT_MATRIX = types.int64[:, ::1]
+
+
+@njit(cache=True)
+def markov(rates: FloatArray, dt: float) -> FloatArray:
+    """Return exp(rates·dt) (r, r): row i holds the probabilities of each model after dt, starting from model i."""
+    r = rates.shape[0]
+    largest = 0.0
+    for i in range(r):
+        largest = max(largest, -rates[i, i] * dt)
+    halvings = 0
+    while largest > 0.1:
+        largest *= 0.5
+        halvings += 1
+    A = rates * (dt / 2.0**halvings)
+    out, term = np.eye(r), np.eye(r)
+    for k in range(1, 10):
+        term = term @ A / k
+        out += term
+    for _ in range(halvings):
+        out = out @ out
+    return out
+
+
+@njit(cache=True)
+def mix(
+    weights: FloatArray,
+    transition: FloatArray,
+    X: FloatArray,
+    P: FloatArray,
+    sizes: IntArray,
+    labels: IntArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the predicted weights (r,) and each model's mixed mean (r, N) and covariance (r, N, N)."""
+    r, N = X.shape
+    predicted = np.zeros(r)
+    for j in range(r):
+        for i in range(r):
+            predicted[j] += transition[i, j] * weights[i]
+    X_out, P_out = np.zeros_like(X), np.zeros_like(P)
+    at = np.empty((r, N), np.int64)
+    x = np.empty((r, N))
+    for j in range(r):
+        n = sizes[j]
+        mean = np.zeros(N)
+        for i in range(r):
+            same = 1.0 if i == j else 0.0
+            share = transition[i, j] * weights[i] / predicted[j] if predicted[j] > 0.0 else same
+            for a in range(n):
+                at[i, a] = -1
+                for b in range(sizes[i]):
+                    if labels[i, b] == labels[j, a]:
+                        at[i, a] = b
+                x[i, a] = X[i, at[i, a]] if at[i, a] >= 0 else X[j, a]
+                mean[a] += share * x[i, a]
+        for i in range(r):
+            same = 1.0 if i == j else 0.0
+            share = transition[i, j] * weights[i] / predicted[j] if predicted[j] > 0.0 else same
+            for a in range(n):
+                for b in range(n):
+                    value = (x[i, a] - mean[a]) * (x[i, b] - mean[b])
+                    if at[i, a] >= 0 and at[i, b] >= 0:
+                        value += P[i, at[i, a], at[i, b]]
+                    elif at[i, a] < 0 and at[i, b] < 0:
+                        value += P[j, a, b]
+                    P_out[j, a, b] += share * value
+        X_out[j] = mean
+    return predicted, X_out, P_out
+
+
+@njit(cache=True)
+def reweigh(predicted: FloatArray, log_likelihoods: FloatArray) -> FloatArray:
+    """Return predicted·likelihood, normalised; no weight falls below 1e-12, so that none is lost for good."""
+    best = log_likelihoods.max()
+    out = np.empty_like(predicted)
+    for j in range(predicted.shape[0]):
+        out[j] = max(predicted[j] * math.exp(log_likelihoods[j] - best), 1e-12)
+    total = out.sum()
+    for j in range(out.shape[0]):
+        out[j] /= total
+    return out
+
+
+@njit(cache=True)
+def combine(weights: FloatArray, X: FloatArray, P: FloatArray, n: int) -> tuple[FloatArray, FloatArray]:
+    """Return the moment-matched mean (n,) and covariance (n, n) of the first n components."""
+    x, out = np.zeros(n), np.zeros((n, n))
+    r = X.shape[0]
+    for j in range(r):
+        x += weights[j] * X[j, :n]
+    for j in range(r):
+        for a in range(n):
+            for b in range(n):
+                out[a, b] += weights[j] * (P[j, a, b] + (X[j, a] - x[a]) * (X[j, b] - x[b]))
+    return x, out
+
+
+@njit(cache=True)
+def rescale(scale: FloatArray, z: FloatArray, m: int, rows: IntArray, R: FloatArray) -> None:
+    """Multiply R[:m, :m] by √scale on both sides; the first m entries of `rows` are set to the components it holds."""
+    i = 0
+    for c in range(7):
+        if not math.isnan(z[c]) and i < m:
+            rows[i] = c
+            i += 1
+    for i in range(m):
+        for j in range(m):
+            R[i, j] *= math.sqrt(scale[rows[i]] * scale[rows[j]])
+
+
+@njit(cache=True)
+def adapt(
+    scale: FloatArray,
+    bias: FloatArray,
+    seen: FloatArray,
+    rows: IntArray,
+    e: FloatArray,
+    spread: FloatArray,
+    nominal: FloatArray,
+    memory: float,
+    limit: float,
+) -> None:
+    """Move one sensor's noise scale (7,), of the components `rows` (m,), towards what a residual shows.
+
+    After an update the residual e = z - h(x⁺) and HP⁺Hᵀ (`spread`) tell R: E[e²] + HP⁺Hᵀ = R (the EM step; Särkkä and
+    Nummenmaa 2009 in its stationary form). A manoeuvre shows as a residual that keeps its sign: its running mean
+    `bias` over a fifth of the memory is taken off first, so that it is not mistaken for noise. A single residual counts
+    for no more than 9 times the present R, and the scale stays within `limit` and 1/`limit` of the declared one.
+    `memory` is in reports; `seen` (7,) counts them, so that the first ones weigh more.
+    """
+    for i in range(rows.shape[0]):
+        c = rows[i]
+        seen[c] += 1.0
+        a = max(5.0 / memory, 1.0 / seen[c])
+        d = e[i] - bias[c] if seen[c] > 1.0 else e[i]
+        gain = 1.0 + a / (2.0 - a) if seen[c] > 1.0 else 1.0
+        bias[c] += a * (e[i] - bias[c])
+        present = scale[c] * nominal[i]
+        shown = min(d * d / gain, 9.0 * present) + spread[i]
+        g = max(1.0 / memory, 1.0 / (seen[c] + 10.0))
+        scale[c] = min(max((1.0 - g) * scale[c] + g * shown / nominal[i], 1.0 / limit), limit)
+
+
+@njit(
+    types.int64(
+        MOTION, MATRIX, INTS, INT_MATRIX, MATRIX, OBSERVATION, VECTOR, MATRIX, STACK, types.float64, VECTOR, MATRIX,
+        MATRIX, INTS, MATRIX, types.float64, types.float64, types.int64, MATRIX, STACK, MATRIX,
+    ),
+    cache=True,
+)  # fmt: skip
+def imm_stream(
+    motion: Any,
+    parameters: FloatArray,
+    sizes: IntArray,
+    labels: IntArray,
+    rates: FloatArray,
+    observe: Any,
+    weights0: FloatArray,
+    X0: FloatArray,
+    P0: FloatArray,
+    t0: float,
+    t: FloatArray,
+    z: FloatArray,
+    context: FloatArray,
+    sensor: IntArray,
+    scale: FloatArray,
+    memory: float,
+    limit: float,
+    n_out: int,
+    x_out: FloatArray,
+    P_out: FloatArray,
+    weights_out: FloatArray,
+) -> int:
+    """Filter k reports with r models that share one motion kernel, told apart by `parameters` (r, p).
+
+    `rates` (r, r) is the generator of the Markov chain between models (1/s, rows add to zero). Filled per report: the
+    moment-matched mean and covariance of the first `n_out` components and the weights (k, r). Returns reports done.
+
+    `sensor` (k,) says which row of `scale` (s, 7) multiplies the noise variances; with `memory` > 0 (reports) the
+    scales are adapted, see `adapt`.
+    """
+    r = X0.shape[0]
+    weights, X, P = weights0.copy(), X0.copy(), P0.copy()
+    log_likelihoods = np.empty(r)
+    bias, seen = np.zeros_like(scale), np.zeros_like(scale)
+    rows = np.empty(7, np.int64)
+    now = t0
+    for k in range(t.shape[0]):
+        dt = t[k] - now
+        if dt < 0.0:
+            return k
+        if dt > 0.0:
+            weights, X, P = mix(weights, markov(rates, dt), X, P, sizes, labels)
+        now = t[k]
+        for j in range(r):
+            n = sizes[j]
+            moved, F, Q = np.empty(n), np.empty((n, n)), np.empty((n, n))
+            y, H, R = np.empty(7), np.empty((7, n)), np.empty((7, 7))
+            motion(X[j, :n].copy(), dt, parameters[j], moved, F, Q)
+            covariance = sandwich(F, P[j, :n, :n].copy(), Q)
+            m = observe(moved, z[k], context[k], y, H, R)
+            log_likelihoods[j] = 0.0
+            if m > 0:
+                rescale(scale[sensor[k]], z[k], m, rows, R)
+                moved, covariance, _, _, log_likelihoods[j] = joseph_update(
+                    moved, covariance, y[:m].copy(), H[:m].copy(), R[:m, :m].copy(), n
+                )
+                if np.isnan(log_likelihoods[j]):
+                    return k
+            X[j, :n] = moved
+            P[j, :n, :n] = covariance
+        weights = reweigh(weights, log_likelihoods)
+        x_out[k], P_out[k] = combine(weights, X, P, n_out)
+        weights_out[k] = weights
+        if memory > 0.0:
+            y, H, R = np.empty(7), np.empty((7, n_out)), np.empty((7, 7))
+            m = observe(x_out[k], z[k], context[k], y, H, R)
+            rescale(np.ones(7), z[k], m, rows, R)
+            spread = np.empty(7)
+            nominal = np.empty(7)
+            for i in range(m):
+                nominal[i] = R[i, i]
+                spread[i] = 0.0
+                for a in range(n_out):
+                    for b in range(n_out):
+                        spread[i] += H[i, a] * P_out[k, a, b] * H[i, b]
+            s = sensor[k]
+            adapt(scale[s], bias[s], seen[s], rows[:m], y, spread, nominal, memory, limit)
+    return len(t)
