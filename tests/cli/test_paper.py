@@ -42,3 +42,24 @@ def test_mistakes_end_with_one_line(arguments: tuple[str, ...], message: str) ->
     assert message in done.stderr
     assert done.stderr.count("\n") == 1
     assert not done.stdout
+
+
+def test_async_ekf_json() -> None:
+    done = boresight("paper", "async_ekf", "--runs", "1", "--json")
+    assert done.returncode == 0, done.stderr
+    rows = json.loads(done.stdout)["rows"]
+    assert {row["scenario"] for row in rows} >= {"S0", "S2"}
+    keys = {"scenario", "method", "position_m", "velocity_m_s", "position_ratio", "anees_per_dim"}
+    assert all(set(row) == keys for row in rows)
+    methods = {row["method"] for row in rows}
+    assert methods >= {
+        "as_printed",
+        "interpolated",
+        "radar_only",
+        "cv",
+        "ca",
+        "imm",
+        "adaptive_q",
+        "adaptive_r",
+        "rts_ca",
+    }

@@ -9,6 +9,7 @@ app = App(name="paper", help="Print a paper's table: as printed, corrected, and 
 # One line a paper: module:function, and the sentence that `boresight paper --help` shows.
 PAPERS: dict[str, tuple[str, str]] = {
     "shao2012": ("boresight.cli.paper_shao2012:shao2012", "Radar and infrared in modified spherical coordinates."),
+    "async_ekf": ("boresight.cli.paper_async_ekf:async_ekf", "Radar and infrared at different times."),
 }
 
 for _name, (_target, _help) in PAPERS.items():

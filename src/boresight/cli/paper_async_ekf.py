@@ -1,0 +1,47 @@
+"""`boresight paper async_ekf`."""
+
+from __future__ import annotations
+
+from boresight.cli.output import print_json, print_table
+from boresight.errors import UserError, did_you_mean
+
+COLUMNS = {
+    "scenario": "scenario",
+    "method": "method",
+    "position_m": "position\nm",
+    "velocity_m_s": "velocity\nm/s",
+    "position_ratio": "position\n/bound",
+    "anees_per_dim": "ANEES\n/dim",
+}
+
+
+def async_ekf(*, scenario: str = "all", runs: int = 500, seed: int = 1, json: bool = False) -> None:
+    """Print async_ekf's table: the listing, its mistakes mended in turn, and filters at the data's own times.
+
+    Parameters
+    ----------
+    scenario
+        S0 (truth drawn from the model), S2 (the paper's path), or all.
+    runs
+        Monte Carlo runs of each scenario.
+    seed
+        Of the random numbers.
+    json
+        Print one JSON object instead of a table.
+    """
+    from boresight.papers.async_ekf.scenario import SCENARIOS
+    from boresight.papers.async_ekf.table import table
+
+    names = list(SCENARIOS) if scenario == "all" else [scenario]
+    if not set(names) <= set(SCENARIOS):
+        known = [*SCENARIOS, "all"]
+        raise UserError(
+            f"--scenario must be one of {', '.join(known)}, not '{scenario}'{did_you_mean(scenario, known)}"
+        )
+    if runs < 1:
+        raise UserError(f"--runs must be at least 1, not {runs}")
+    rows = [row for name in names for row in table(name, runs, seed)]
+    if json:
+        print_json("paper async_ekf", {"scenario": scenario, "runs": runs, "seed": seed}, rows)
+        return
+    print_table(COLUMNS, rows, f"async_ekf, {runs} runs, seed {seed}", digits=3)
