@@ -47,7 +47,7 @@ def by_row(data: Data, run: int) -> FloatArray:
     """Return infrared (n, 2) by the radar's row number, as the listing does."""
     n = int(data.is_radar.sum())
     assert data.t[~data.is_radar][0] == IR_PHASE
-    return data.z[run][~data.is_radar, 1:3][:n]
+    return np.asarray(data.z[run][~data.is_radar, 1:3][:n])
 
 
 def paired(data: Data, run: int, infrared: FloatArray, radar: Radar, ir: Infrared) -> Reports:
