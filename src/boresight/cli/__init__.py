@@ -26,6 +26,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "score": ("boresight.cli.score:score_command", "Score tracks against the truth of their recording."),
     "info": ("boresight.cli.info:info", "Say what is in a recording."),
     "export": ("boresight.cli.export:export", "Write tracks as CSV, GeoJSON or KML."),
+    "convert": ("boresight.cli.convert:convert", "Turn pixels, az/el, ENU, NED, ECEF and geodetic into each other."),
     "paper": ("boresight.cli.paper:app", "Print a paper's table: as printed, corrected, and ours."),
 }
 

@@ -18,16 +18,22 @@ Values = tuple[Value, Value, Value]
 
 def columns(*values: ArrayLike) -> tuple[list[FloatArray], tuple[int, ...]]:
     """Return the values broadcast against each other as flat float64 columns, and their common shape."""
-    arrays = [np.asarray(v, dtype=np.float64) for v in values]
+    arrays = [_own(v) for v in values]
     shape = np.broadcast_shapes(*(a.shape for a in arrays))
     if all(a.shape == shape for a in arrays):
         return [np.ascontiguousarray(a).reshape(-1) for a in arrays], shape
     return [np.broadcast_to(a, shape).flatten() for a in arrays], shape
 
 
+def _own(values: ArrayLike) -> FloatArray:
+    """Return float64 that the kernels take: a read-only view would make them compile once more."""
+    a = np.asarray(values, dtype=np.float64)
+    return a if a.flags.owndata or a.flags.writeable else a.copy()
+
+
 def rows(values: ArrayLike, *tail: int, what: str) -> tuple[FloatArray, tuple[int, ...]]:
     """Return (..., *tail) as (n, *tail) float64 with the leading shape; raises UserError for another shape."""
-    a = np.asarray(values, dtype=np.float64)
+    a = _own(values)
     if a.shape[a.ndim - len(tail) :] != tail:
         raise UserError(f"{what} has shape {a.shape}; it must end in {tail}")
     lead = a.shape[: a.ndim - len(tail)]

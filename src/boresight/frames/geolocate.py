@@ -165,9 +165,9 @@ def _direction_covariance(d: FloatArray, tangent_covariance: ArrayLike) -> Float
 def _broadcast(
     position: ArrayLike, direction: ArrayLike, scalar: ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    p, d = np.broadcast_arrays(np.asarray(position, dtype=np.float64), unit(direction))
+    p, d = np.asarray(position, dtype=np.float64), unit(direction)
     s = np.asarray(scalar, dtype=np.float64)
-    shape = np.broadcast_shapes(p.shape[:-1], s.shape)
+    shape = np.broadcast_shapes(p.shape[:-1], d.shape[:-1], s.shape)
     return np.broadcast_to(p, (*shape, 3)), np.broadcast_to(d, (*shape, 3)), np.broadcast_to(s, shape)
 
 
