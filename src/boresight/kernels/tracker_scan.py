@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from boresight.kernels.assignment import assign_sparse
 from boresight.kernels.measurement import measure
@@ -53,11 +54,11 @@ def clutter_density(tr: Tracks, s: Settings, sensor: SensorTable, z: FloatArray,
     high = sensor.range_high if math.isfinite(sensor.range_high) else max(tr.seen_range[sensor.number], 100.0)
     volume = volume_of(mask, m, sensor, high, s.d, s.speed_sigma)
     if sensor.ranging:
-        return known[AZIMUTH_BINS] / volume
+        return float(known[AZIMUTH_BINS] / volume)
     share = 2.0 * math.pi / AZIMUTH_BINS / max(sensor.azimuth_span, 1e-9)
     b = azimuth_bin(z[1])
     local = (known[(b - 1) % AZIMUTH_BINS] + 2.0 * known[b] + known[(b + 1) % AZIMUTH_BINS]) / 4.0
-    return local / (volume * share)
+    return float(local / (volume * share))
 
 
 @njit(cache=True)
@@ -155,7 +156,7 @@ def gate_all(
     s: Settings,
     sensor: SensorTable,
     look: Look,
-    usable: FloatArray,
+    usable: NDArray[np.bool_],
     p_d: FloatArray,
     fate: IntArray,
     owner: IntArray,
@@ -373,7 +374,13 @@ def component_covariance(look: Look, k: int, s: Settings, sensor: SensorTable, m
 
 @njit(cache=True)
 def learn_clutter(
-    tr: Tracks, s: Settings, sensor: SensorTable, look: Look, claims: IntArray, row_of_col: IntArray, usable: FloatArray
+    tr: Tracks,
+    s: Settings,
+    sensor: SensorTable,
+    look: Look,
+    claims: IntArray,
+    row_of_col: IntArray,
+    usable: NDArray[np.bool_],
 ) -> None:
     """Let the detections that no shown track took teach the mean number of false detections of a look."""
     known = tr.clutter[sensor.number]
@@ -410,7 +417,7 @@ def begin(
     fate: IntArray,
     owner: IntArray,
     row_of_col: IntArray,
-    usable: FloatArray,
+    usable: NDArray[np.bool_],
 ) -> None:
     """Begin a track at every detection with a position that no track took."""
     d = s.d

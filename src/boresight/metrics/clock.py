@@ -27,8 +27,7 @@ class Sampled:
 def clock_of(first: float, last: float) -> FloatArray:
     """Return the times (s) from the first to the last detection in steps of 0.5 s."""
     steps = int(np.floor((last - first) / STEP + 1e-9))
-    clock: FloatArray = first + STEP * np.arange(steps + 1)
-    return clock
+    return np.asarray(first + STEP * np.arange(steps + 1.0), dtype=np.float64)
 
 
 def sample_truth(truth: Truth, clock: FloatArray, d: int) -> Sampled:
