@@ -23,6 +23,8 @@ TRACKER_KEYS = {
     "show_time_s": ("show_time", 1.0),
     "static_share": ("static_share", 1.0),
     "static_wander_m2_s": ("static_q", 1.0),
+    "stop_floor": ("stop_floor", 1.0),
+    "doubt": ("doubt", 1.0),
     "confirm_above": ("confirm_above", 1.0),
     "hide_below": ("hide_below", 1.0),
     "delete_below": ("delete_below", 1.0),
@@ -56,6 +58,8 @@ class TrackerTable(TableModel, frozen=True):
     show_time_s: float | None = None
     static_share: float | None = None
     static_wander_m2_s: float | None = None
+    stop_floor: float | None = None
+    doubt: float | None = None
     confirm_above: float | None = None
     hide_below: float | None = None
     delete_below: float | None = None

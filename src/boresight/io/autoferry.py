@@ -56,7 +56,7 @@ SENSORS: dict[int, SensorTable] = {
         axes="platform_enu",
         sigma_azimuth_deg=0.5,
         period_s=0.117,
-        p_detection=0.6,
+        p_detection=0.45,
         clutter_per_scan=2.0,
     ),
     4: SensorTable(
@@ -76,7 +76,10 @@ TRACKER_TOML = """\
 # Settings for the Autoferry sensor suite, one set for all scenarios; `boresight track` uses this file unless --config
 # names another.
 [tracker]
-hide_below = 0.6
+speed_sigma_m_s = 5.0
+doubt = 0.001
+confirm_above = 0.95
+hide_below = 0.8
 
 [[sensor]]
 id = "radar"
@@ -91,14 +94,14 @@ bias_time_s = 20.0
 
 [[sensor]]
 id = "ir"
-bias_azimuth_deg = 1.5
-bias_time_s = 15.0
+bias_azimuth_deg = 3.0
+bias_time_s = 40.0
 decorrelation_s = 2.0
 
 [[sensor]]
 id = "eo"
-bias_azimuth_deg = 1.5
-bias_time_s = 15.0
+bias_azimuth_deg = 3.0
+bias_time_s = 40.0
 decorrelation_s = 2.0
 """
 

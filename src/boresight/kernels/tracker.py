@@ -88,6 +88,8 @@ class Settings(NamedTuple):
     show_time: float  # s, mean time hidden
     static_share: float  # of a new track's existence
     static_q: float  # m²/s
+    stop_floor: float  # least weight of "it does not move": a target may stop
+    doubt: float  # least existence with which a track competes for detections
     delete_below: float
     show_above: float
     hide_below: float

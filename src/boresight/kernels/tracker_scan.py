@@ -190,7 +190,7 @@ def gate_all(
         if p_d[i] <= 0.0:
             continue
         there = 1.0 - tr.weight[i, NOTHING] - tr.weight[i, HIDDEN]
-        p_there = max(min(there, 1.0 - 1e-9), 0.1)
+        p_there = max(min(there, 1.0 - 1e-9), s.doubt)
         log_hit = math.log(p_there * p_d[i])
         log_miss = math.log(1.0 - p_there * p_d[i])
         last_pose = -1
@@ -255,6 +255,21 @@ def weigh(tr: Tracks, i: int, log_visible: float, log_static: float, temper: flo
 
 
 @njit(cache=True)
+def allow_stop(tr: Tracks, i: int, s: Settings) -> None:
+    """Let a target that moved begin to stand still where it is now: the anchor is dropped anew."""
+    w = tr.weight[i]
+    target = w[VISIBLE] + w[HIDDEN]
+    if w[STATIC] < s.stop_floor * target:
+        w[VISIBLE] -= s.stop_floor * w[VISIBLE]
+        w[HIDDEN] -= s.stop_floor * w[HIDDEN]
+        w[STATIC] += s.stop_floor * target
+        for a in range(s.d):
+            tr.anchor[i, a] = tr.x[i, a]
+            for b in range(s.d):
+                tr.anchor_P[i, a, b] = tr.P[i, a, b]
+
+
+@njit(cache=True)
 def take(
     tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int, loglik: float, p_d: float, temper: float
 ) -> None:
@@ -281,6 +296,8 @@ def take(
         log_static += static_likelihood(tr, i, s, fix, fix_R, True) - moving
     apply_update(tr.x[i], tr.P[i], y, S, PHt, c)
     weigh(tr, i, log_visible, log_static, temper)
+    if sensor.ranging:
+        allow_stop(tr, i, s)
     tr.life[i, 1] = look.t + look.dt[k]
     tr.life[i, 3] += 1.0
 

@@ -36,12 +36,14 @@ class TrackerConfig:
     q: float | None = None  # m²/s³, white-acceleration power spectral density (2-D: 0.1, 3-D: 1)
     speed_sigma: float | None = None  # m/s, prior velocity of a new track per axis (2-D: 8, 3-D: 150)
     gate_probability: float = 0.999
-    birth_rate: float = 0.02  # new targets a look
+    birth_rate: float = 0.01  # new targets a look
     survival_time: float = 120.0  # s
-    hide_time: float = 60.0  # s, mean time for which a target stays visible
+    hide_time: float = 120.0  # s, mean time for which a target stays visible
     show_time: float = 10.0  # s, mean time for which it stays hidden
     static_share: float = 0.3  # of new objects do not move (and are not reported)
     static_q: float = 0.5  # m²/s, how an object that does not move may still wander
+    stop_floor: float = 0.05  # least weight of "it stands still", beside that of a moving target
+    doubt: float = 0.1  # least probability of existence with which a track competes for detections
     confirm_above: float = 0.9  # probability of a moving target above which a track is shown
     hide_below: float = 0.4  # and below which it is shown no more
     delete_below: float = 1e-4

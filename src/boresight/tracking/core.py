@@ -87,6 +87,8 @@ def make_plan(
         show_time=config.show_time,
         static_share=config.static_share,
         static_q=config.static_q,
+        stop_floor=config.stop_floor,
+        doubt=config.doubt,
         delete_below=config.delete_below,
         show_above=config.confirm_above,
         hide_below=config.hide_below,
