@@ -24,6 +24,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "simulate": ("boresight.cli.simulate:simulate", "Turn a scenario into a recording with truth."),
     "track": ("boresight.cli.track:track", "Track the targets of a recording."),
     "score": ("boresight.cli.score:score_command", "Score tracks against the truth of their recording."),
+    "report": ("boresight.cli.report:report", "Write a page that shows what the tracker did."),
     "info": ("boresight.cli.info:info", "Say what is in a recording."),
     "export": ("boresight.cli.export:export", "Write tracks as CSV, GeoJSON or KML."),
     "convert": ("boresight.cli.convert:convert", "Turn pixels, az/el, ENU, NED, ECEF and geodetic into each other."),

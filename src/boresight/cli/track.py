@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
-import importlib.util
 import shlex
 import sys
 import time
@@ -37,7 +35,7 @@ def track(
     sensors: str | None = None,
     config: Path | None = None,
     force: bool = False,
-    report: bool = True,
+    report: Annotated[bool, Parameter(negative="--no-report")] = True,
     json: bool = False,
 ) -> None:
     """Track the targets of a recording; writes tracks.parquet, decisions.parquet, summary.json and report.html.
@@ -73,11 +71,14 @@ def track(
     command += ["--sensors", ",".join(ids)] if ids else []
     command += ["--config", str(config)] if config else []
     results.summary["command"] = shlex.join(command)
+    results.summary["recording_folder"] = str(rec)
     results.summary["config_file"] = None if source is None else str(source)
     with output_folder(output, force) as folder:
         write_results(results, recording, folder)
         if report:
-            _write_report(folder, results, recording)
+            from boresight.report.html import write_report
+
+            write_report(folder / "report.html", results, recording)
     counts = results.summary["counts"]
     row = {"output": str(output), **counts, "seconds": results.summary["seconds"]}
     if json:
@@ -189,9 +190,3 @@ def _progress(total: int) -> Iterator[Callable[[Scan], None] | None]:
                 progress.update(task, completed=done, rate=f"{rate:,.0f}")
 
         yield tick
-
-
-def _write_report(folder: Path, results: Results, recording: Recording) -> None:
-    if importlib.util.find_spec("boresight.report.html") is None:
-        return
-    importlib.import_module("boresight.report.html").write_report(folder / "report.html", results, recording)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from boresight.errors import UserError
@@ -208,12 +209,18 @@ def _target_row(t: TargetScore, d: int) -> dict[str, Any]:
     }
 
 
-def nis_rows(recording: Recording, decisions: DecisionRows) -> list[dict[str, Any]]:
-    """Return per sensor how its normalised innovations compare with chi-square, and what became of its reports."""
+def degrees_of_freedom(recording: Recording) -> NDArray[np.int64]:
+    """Return (n,) how many components of each row a track of the recording's dimensions can be compared with."""
     flat = [Component.ELEVATION, Component.UP] if recording.dimensions == 2 else []
     measured = np.isfinite(recording.detections.z)
     measured[:, flat] = False
-    dof = measured.sum(axis=1)
+    dof: NDArray[np.int64] = measured.sum(axis=1)
+    return dof
+
+
+def nis_rows(recording: Recording, decisions: DecisionRows) -> list[dict[str, Any]]:
+    """Return per sensor how its normalised innovations compare with chi-square, and what became of its reports."""
+    dof = degrees_of_freedom(recording)
     updated = decisions.fate == FATES.index(Fate.UPDATED)
     out = []
     for i, sensor in enumerate(recording.sensors):
