@@ -23,6 +23,18 @@ COLUMNS = {  # the ratio in elevation is left to --json: 80 columns
 }
 
 
+CASE_COLUMNS = {
+    "case": "case",
+    "method": "method",
+    "time_s": "time\ns",
+    "position_m": "position\nm",
+    "range_m": "range\nm",
+    "range_sigma_reported_m": "reported\nm",
+    "range_observable": "range\nknown",
+    "anees_per_dim": "ANEES\n/dim",
+}
+
+
 def shao2012(
     *,
     set_: Annotated[str, Parameter(name="--set")] = "A",
@@ -35,7 +47,8 @@ def shao2012(
     Parameters
     ----------
     set_
-        A, P (paper-like), B, C or M (manoeuvring): noise and rates as docs/filters.md states them.
+        A, P (paper-like), B, C or M (manoeuvring): noise and rates as docs/filters.md states them; or one of the
+        cases weave, straight, diffuse, overhead, where the choice of coordinates and of noise decides.
     runs
         Monte Carlo runs.
     seed
@@ -43,15 +56,28 @@ def shao2012(
     json
         Print one JSON object instead of a table.
     """
+    from boresight.papers.shao2012.cases import CASES
     from boresight.papers.shao2012.scenario import SETS
-    from boresight.papers.shao2012.table import table
 
-    if set_ not in SETS:
-        raise UserError(f"--set must be one of {', '.join(SETS)}, not '{set_}'{did_you_mean(set_, SETS)}")
+    known = [*SETS, *CASES]
+    if set_ not in known:
+        raise UserError(f"--set must be one of {', '.join(known)}, not '{set_}'{did_you_mean(set_, known)}")
     if runs < 1:
         raise UserError(f"--runs must be at least 1, not {runs}")
-    rows: list[dict[str, Any]] = table(set_, runs, seed)
+    rows = _rows(set_, runs, seed)
     if json:
         print_json("paper shao2012", {"set": set_, "runs": runs, "seed": seed}, rows)
         return
-    print_table(COLUMNS, rows, f"shao2012, set {set_}, {runs} runs, seed {seed}", digits=3)
+    title = f"shao2012, {'case' if set_ in CASES else 'set'} {set_}, {runs} runs, seed {seed}"
+    print_table(CASE_COLUMNS if set_ in CASES else COLUMNS, rows, title, digits=3)
+
+
+def _rows(name: str, runs: int, seed: int) -> list[dict[str, Any]]:
+    import numpy as np
+
+    from boresight.papers.shao2012.cases import CASES
+    from boresight.papers.shao2012.table import table
+
+    if name in CASES:
+        return CASES[name](runs, np.random.default_rng(seed))
+    return table(name, runs, seed)

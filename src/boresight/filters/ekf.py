@@ -56,20 +56,24 @@ def update(
     States from `n_estimated` on are considered (Schmidt): they widen the covariance but are not estimated.
     Raises UserError where the report holds no component that can be used, or S is not positive definite.
     """
+    y, H, R = linearised(sensor, z, state.x)
+    n = len(state.x) if n_estimated is None else n_estimated
+    x, P, S, nis, log_likelihood = joseph_update(state.x, state.P, y, H, R, n)
+    if math.isnan(nis):
+        raise UserError("the innovation covariance is not positive definite: check the prior and the sensor's noise")
+    return GaussianState(state.t, x, P), UpdateInfo(y, S, nis, log_likelihood)
+
+
+def linearised(sensor: MeasurementModel, z: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return innovation, H and R of the components that `z` holds and that are defined at `x`; UserError if none."""
     if isinstance(sensor, KernelSensor):
-        y, H = sensor.linearise(z, state.x)
+        y, H = sensor.linearise(z, x)
     else:
-        y, H = sensor.innovation(z, state.x), sensor.H(state.x)
-    R = sensor.R(state.x)
+        y, H = sensor.innovation(z, x), sensor.H(x)
+    R = sensor.R(x)
     seen = np.isfinite(y)
     if not seen.all():
         if not seen.any():
             raise UserError("the measurement has no component that can be used: nothing measured, or zero range")
         y, H, R = y[seen], H[seen], R[np.ix_(seen, seen)]
-    n = len(state.x) if n_estimated is None else n_estimated
-    x, P, S, nis, log_likelihood = joseph_update(
-        state.x, state.P, y, np.ascontiguousarray(H), np.ascontiguousarray(R), n
-    )
-    if math.isnan(nis):
-        raise UserError("the innovation covariance is not positive definite: check the prior and the sensor's noise")
-    return GaussianState(state.t, x, P), UpdateInfo(y, S, nis, log_likelihood)
+    return y, np.ascontiguousarray(H, dtype=float), np.ascontiguousarray(R, dtype=float)

@@ -36,6 +36,7 @@ class KernelSensor:
     context: FloatArray  # (66,) what the kernel wants to know
     kernel = staticmethod(observation.observe)
     pose: SensorPose
+    dimensions: int
 
     @property
     def dimension(self) -> int:
