@@ -66,7 +66,7 @@ def simulate(scenario: Scenario, rng: np.random.Generator) -> Recording:
         if target.birth < end
     ]
     names = [t.id for t in scenario.targets if t.birth < end]
-    true = {p.id: pose_track(p.true_track(-1.0, end + 1.0, scenario.step)) for p in scenario.platforms}
+    true = {p.id: pose_track(p.true_track(-1.0, end + 1.0, scenario.step), scenario.site) for p in scenario.platforms}
     recorded = [
         platform.recorded_track(0.0, end, stream)
         for platform, stream in zip(scenario.platforms, of_platforms.spawn(len(scenario.platforms)), strict=True)

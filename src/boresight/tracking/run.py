@@ -30,7 +30,8 @@ NAVIGATION_AHEAD = 5.0  # s beyond the ends over which it is still extrapolated
 def tracker_for(recording: Recording, config: TrackerConfig, sensors: Sequence[str] | None = None) -> Tracker:
     """Return a tracker for a recording; `sensors` are the ids to use (all)."""
     poses = {
-        p.id: pose_track(p, max_extrapolation=NAVIGATION_AHEAD, max_gap=NAVIGATION_GAP) for p in recording.platforms
+        p.id: pose_track(p, recording.site, max_extrapolation=NAVIGATION_AHEAD, max_gap=NAVIGATION_GAP)
+        for p in recording.platforms
     }
     use = None if sensors is None else tuple(sorted(recording.sensor_index(name) for name in sensors))
     return Tracker(config, recording.sensors, recording.dimensions, poses, use)
