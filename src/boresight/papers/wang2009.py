@@ -120,4 +120,3 @@ def _paper_angles(d: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return α (left positive) and β of east/north/up-like vectors: α_g = atan2(y, x), β_g = asin(z)."""
     azimuth, elevation, _ = azel_from_enu(d[:, 0], d[:, 1], d[:, 2])
     return -azimuth, elevation
-
