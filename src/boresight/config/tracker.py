@@ -42,6 +42,7 @@ SENSOR_KEYS = {
     "bias_time_s": ("bias_time", 1.0),
     "decorrelation_s": ("decorrelation", 1.0),
     "fade_range_m": ("fade_range", 1.0),
+    "resolution_m": ("resolution", 1.0),
     "report_range_m": ("report_range", 1.0),
 }
 
@@ -81,6 +82,7 @@ class ErrorsTable(TableModel, frozen=True):
     bias_time_s: float | None = None
     decorrelation_s: float | None = None
     fade_range_m: float | None = None
+    resolution_m: float | None = None
     report_range_m: float | None = None
 
 

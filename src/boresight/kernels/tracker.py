@@ -72,6 +72,7 @@ class SensorTable(NamedTuple):
     bias: IntArray  # (7,) state index of the bias of each component, -1 for none
     decorrelation: float  # s: looks closer in time than this are not independent evidence of existence
     fade_range: float  # m: where p_detection has fallen to half
+    resolution: float  # m: nearer targets may give one detection together
     report_range: float  # m: targets farther from the sensor are tracked but not shown on its word
 
 

@@ -138,9 +138,10 @@ def scan_step(
             fate[k] = UPDATED
             owner[k] = tr.birth[i]
             nis_of[k] = distance[e]
-            take(tr, i, s, sensor, look, k, loglik[e], p_d[i], temper)
-        else:
-            weigh(tr, i, math.log(1.0 - p_d[i]), math.log(1.0 - p_d[i]), temper)
+            take(tr, i, s, sensor, look, k, evidence(i, start, column, loglik, row_of_col, p_d[i]), temper)
+        elif not merged(tr, i, s, sensor, start, column, row_of_col):
+            log_any = evidence(i, start, column, loglik, row_of_col, p_d[i])
+            weigh(tr, i, log_any, log_any, temper)
     learn_clutter(tr, s, sensor, look, claims, row_of_col, usable)
     if sensor.ranging:
         begin(tr, s, sensor, look, fate, owner, row_of_col, usable)
@@ -244,6 +245,36 @@ def grown_int(a: IntArray, room: int) -> IntArray:
 
 
 @njit(cache=True)
+def evidence(
+    i: int, start: IntArray, column: IntArray, loglik: FloatArray, row_of_col: IntArray, p_d: float
+) -> float:
+    """Log-likelihood of this look if track `i` is a visible target, over that if it is not: missed, or any of the
+    detections in its gate that no other track took (Musicki, Evans, Stankovic 1994, the IPDA likelihood ratio)."""
+    total = 1.0 - p_d
+    for e in range(start[i], start[i + 1]):
+        if row_of_col[column[e]] == i or row_of_col[column[e]] < 0:
+            total += p_d * math.exp(min(loglik[e], 100.0))
+    return math.log(total)
+
+
+@njit(cache=True)
+def merged(
+    tr: Tracks, i: int, s: Settings, sensor: SensorTable, start: IntArray, column: IntArray, row_of_col: IntArray
+) -> bool:
+    """Whether the detection that track `i` would have had may be one with that of a near shown track."""
+    for e in range(start[i], start[i + 1]):
+        j = row_of_col[column[e]]
+        if j < 0 or j == i or tr.life[j, 2] == 0.0:
+            continue
+        gap = 0.0
+        for a in range(s.d):
+            gap += (tr.x[i, a] - tr.x[j, a]) ** 2
+        if gap < sensor.resolution**2:
+            return True
+    return False
+
+
+@njit(cache=True)
 def weigh(tr: Tracks, i: int, log_visible: float, log_static: float, temper: float) -> None:
     """Multiply the weights by the likelihoods of the hypotheses (hidden and nothing: 1) and normalise."""
     w = tr.weight[i]
@@ -271,7 +302,7 @@ def allow_stop(tr: Tracks, i: int, s: Settings) -> None:
 
 @njit(cache=True)
 def take(
-    tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int, loglik: float, p_d: float, temper: float
+    tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int, log_visible: float, temper: float
 ) -> None:
     """Condition track `i` on detection `k`: state, anchor and hypotheses."""
     n = tr.x.shape[1]
@@ -285,7 +316,6 @@ def take(
     linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, zhat, H, h6)
     c = components(look.z[k], s.d, mask)
     innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, c, y, S, PHt)
-    log_visible = math.log(p_d) + loglik
     log_static = log_visible
     fix = np.empty(3)
     fix_R = np.empty((3, 3))
@@ -462,10 +492,13 @@ def begin(
                 if b >= 0:
                     P[a, b] -= J[a, e] * P[b, b]
                     P[b, a] = P[a, b]
+        dt = look.dt[k]
         for a in range(d):
             x[a] = fix[a]
             tr.anchor[i, a] = fix[a]
             P[d + a, d + a] = s.speed_sigma**2
+            P[a, d + a] = -dt * s.speed_sigma**2  # seen at its own time, kept at the look's
+            P[d + a, a] = P[a, d + a]
             for b in range(d):
                 acc = 0.0
                 shared = 0.0
@@ -475,7 +508,7 @@ def begin(
                     bias = sensor.bias[mask[e]]
                     if bias >= 0:
                         shared += J[a, e] * P[bias, bias] * J[b, e]
-                P[a, b] = acc + shared
+                P[a, b] = acc + shared + ((dt * s.speed_sigma) ** 2 if a == b else 0.0)
                 tr.anchor_P[i, a, b] = acc
         density = tr.clutter[sensor.number, AZIMUTH_BINS]
         born = s.birth_rate / (s.birth_rate + density)

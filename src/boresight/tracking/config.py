@@ -22,6 +22,7 @@ class SensorErrors:
     bias_time: float = 20.0  # s
     decorrelation: float = 0.0  # s: looks closer in time are not independent evidence that a target exists
     fade_range: float = float("inf")  # m: where the detection probability has fallen to half
+    resolution: float = 0.0  # m: targets nearer to each other may give one detection together (ranging sensors)
     report_range: float = float("inf")  # m: farther targets are tracked but not shown (ranging sensors)
 
 
@@ -42,7 +43,7 @@ class TrackerConfig:
     show_time: float = 10.0  # s, mean time for which it stays hidden
     static_share: float = 0.3  # of new objects do not move (and are not reported)
     static_q: float = 0.5  # m²/s, how an object that does not move may still wander
-    stop_floor: float = 0.05  # least weight of "it stands still", beside that of a moving target
+    stop_floor: float = 0.02  # least weight of "it stands still", beside that of a moving target
     doubt: float = 0.1  # least probability of existence with which a track competes for detections
     confirm_above: float = 0.9  # probability of a moving target above which a track is shown
     hide_below: float = 0.4  # and below which it is shown no more

@@ -72,6 +72,7 @@ def make_plan(
                 bias=bias,
                 decorrelation=errors.decorrelation,
                 fade_range=errors.fade_range,
+                resolution=errors.resolution,
                 report_range=errors.report_range,
             )
         )
