@@ -23,6 +23,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "import": ("boresight.cli.import_:app", "Turn other formats into a recording."),
     "simulate": ("boresight.cli.simulate:simulate", "Turn a scenario into a recording with truth."),
     "track": ("boresight.cli.track:track", "Track the targets of a recording."),
+    "tune": ("boresight.cli.tune:tune", "Find process and measurement noise from a recording's innovations."),
     "score": ("boresight.cli.score:score_command", "Score tracks against the truth of their recording."),
     "report": ("boresight.cli.report:report", "Write a page that shows what the tracker did."),
     "info": ("boresight.cli.info:info", "Say what is in a recording."),

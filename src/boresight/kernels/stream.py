@@ -42,7 +42,7 @@ def ekf_stream(
 
     In: t (k,), z (k, 7) NaN where not measured, context (k, c). Filled per report: the filtered mean and covariance,
     the predicted ones, F of the prediction, and `nis` (k, 2): normalised innovation squared and its dimension (zero
-    where a report held nothing that could be used).
+    where a report held nothing that could be used); with a third column, the log likelihood.
 
     Returns the number of reports done: less than k where time ran backwards or S was not positive definite.
     """
@@ -68,13 +68,15 @@ def ekf_stream(
         if m > 0:
             Rm = R[:m, :m].copy()
             if iterations > 1:
-                x_new, P_new, _, value, _ = iterated_update(observe, x, P, z[k], context[k], iterations)
+                x_new, P_new, _, value, log_likelihood = iterated_update(observe, x, P, z[k], context[k], iterations)
             else:
-                x_new, P_new, _, value, _ = joseph_update(x, P, y[:m], H[:m], Rm, n)
+                x_new, P_new, _, value, log_likelihood = joseph_update(x, P, y[:m], H[:m], Rm, n)
             if np.isnan(value):
                 return k
             x, P = x_new, P_new
             nis[k, 0] = value
+            if nis.shape[1] > 2:
+                nis[k, 2] = log_likelihood
         x_out[k] = x
         P_out[k] = P
     return len(t)
