@@ -98,7 +98,9 @@ def _thread(
     return Thread(reports, d.sensor[rows], np.r_[position, np.zeros(n)], P0)
 
 
-def _contexts(recording: Recording, rows: NDArray[np.int64], t: FloatArray, poses: Mapping[str, PoseTrack]) -> FloatArray:
+def _contexts(
+    recording: Recording, rows: NDArray[np.int64], t: FloatArray, poses: Mapping[str, PoseTrack]
+) -> FloatArray:
     """Return the sensor contexts (k, c) of rows, each sensor where it was at the report's time."""
     d = recording.detections
     out = np.zeros((len(rows), CONTEXT_SIZE))
