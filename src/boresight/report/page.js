@@ -86,7 +86,7 @@ function chart(where, o) {
     const cp = svg("clipPath", {id: clip});
     cp.append(svg("rect", {x: m.l, y: m.t, width: W - m.l - m.r, height: H - m.t - m.b}));
     s.append(cp);
-    for (const v of steps(y0, y1, H / 45)) {
+    for (const v of steps(y0, y1, H / 36)) {
       s.append(svg("line", {x1: m.l, x2: W - m.r, y1: Y(v), y2: Y(v), stroke: "#e6ebf0"}));
       s.append(svg("text", {x: m.l - 6, y: Y(v) + 4, "text-anchor": "end"}, sig(v)));
     }
@@ -253,8 +253,8 @@ function grid() {
   ctx.font = "11px system-ui,sans-serif"; ctx.lineWidth = 1; ctx.strokeStyle = "#e6ebf0"; ctx.fillStyle = "#7b8794";
   const w = W / view.s / L, h = H / view.s / L, km = Math.max(w, h) > 8000, unit = km ? 1000 : 1;
   const x0 = view.x / L - w / 2, y0 = view.y / L - h / 2;
-  for (const v of steps(x0, x0 + w, W / 110)) { const X = px(v * L); ctx.beginPath(); ctx.moveTo(X, 0); ctx.lineTo(X, H); ctx.stroke(); if (X > 60 && X < W - 20) { ctx.textAlign = "center"; ctx.fillText(sig(v / unit), X, H - 5); } }
-  for (const v of steps(y0, y0 + h, H / 80)) { const Y = py(v * L); ctx.beginPath(); ctx.moveTo(0, Y); ctx.lineTo(W, Y); ctx.stroke(); if (Y > 24 && Y < H - 24) { ctx.textAlign = "left"; ctx.fillText(sig(v / unit), 4, Y - 3); } }
+  for (const v of steps(x0, x0 + w, W / 75)) { const X = px(v * L); ctx.beginPath(); ctx.moveTo(X, 0); ctx.lineTo(X, H); ctx.stroke(); if (X > 60 && X < W - 20) { ctx.textAlign = "center"; ctx.fillText(sig(v / unit), X, H - 5); } }
+  for (const v of steps(y0, y0 + h, H / 65)) { const Y = py(v * L); ctx.beginPath(); ctx.moveTo(0, Y); ctx.lineTo(W, Y); ctx.stroke(); if (Y > 24 && Y < H - 24) { ctx.textAlign = "left"; ctx.fillText(sig(v / unit), 4, Y - 3); } }
   ctx.textAlign = "left"; ctx.fillText(`north, ${km ? "km" : "m"} ↑   east, ${km ? "km" : "m"} →`, 4, 13);
 }
 function setTime(v) {
@@ -319,8 +319,9 @@ if (D.dimensions === 3 && high.length) {
 
 // ---------- score and errors
 if (own) {
-  $("scores").append(table([["item", "", true], ["gospa_rms_m", "GOSPA RMS, m"], ["gospa_mean_m", "GOSPA mean, m"], ["gospa_localisation_m", "localisation, m"], ["gospa_missed_m", "missed, m"], ["gospa_false_m", "false, m"],
-    ["ospa_mean_m", "OSPA mean, m"], ["tracked_fraction", "tracked"], ["position_rmse_m", "RMSE, m"], ["identity_switches", "switches"], ["breaks", "breaks"], ["false_track_s", "false-track s"], ["nees_mean", "NEES mean"], ["nees_in_band_95", "NEES in 95 %"]], [own, none]));
+  const names = {gospa_rms_m: "GOSPA RMS, m", gospa_mean_m: "GOSPA mean, m", gospa_localisation_m: "… localisation, m", gospa_missed_m: "… missed targets, m", gospa_false_m: "… false tracks, m", ospa_mean_m: "OSPA mean, m",
+    tracked_fraction: "part of the time tracked", position_rmse_m: "position RMSE, m", identity_switches: "identity switches", breaks: "breaks", false_track_s: "false-track seconds", nees_mean: `NEES mean (${D.dimensions} is right)`, nees_median: "NEES median", nees_in_band_95: "NEES inside its 95 % band"};
+  $("scores").append(table([["what", "", true], ["tracks", "tracks"], ["empty", "empty tracker"]], Object.entries(names).map(([k, what]) => ({what, tracks: own[k], empty: none[k]}))));
   const targets = scores.filter(r => r.item === "target");
   const details = make("details", targets.length <= 12 ? {open: ""} : {}, make("summary", {}, `by target (${targets.length})`));
   details.append(table([["target", "target", true], ["tracked_fraction", "tracked"], ["position_rmse_m", "RMSE, m"], ["identity_switches", "switches"], ["breaks", "breaks"], ["track_ids", "tracks that held it"], ["nees_mean", "NEES mean"], ["nees_in_band_95", "NEES in 95 %"]], targets));
@@ -365,7 +366,7 @@ if (own) {
   $("timeline").append(box);
   drawn(() => {
     const W = Math.max(box.clientWidth, 260), rh = rows.length <= 40 ? 15 : Math.max(2.2, 620 / rows.length), names = rows.length <= 40, l = 64, th = 15;
-    const H = held.length * th + (held.length ? 10 : 0) + rows.length * rh + 24, X = v => l + v / span * (W - l - 10);
+    const H = held.length * th + (held.length ? 10 : 0) + rows.length * rh + 24, X = v => l + Math.min(v, span) / span * (W - l - 10);
     const s = svg("svg", {viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": "Tracks in time"});
     for (const v of steps(0, span, W / 90)) { s.append(svg("line", {x1: X(v), x2: X(v), y1: 0, y2: H - 20, stroke: "#edf0f4"})); s.append(svg("text", {x: X(v), y: H - 6, "text-anchor": "middle"}, sig(v) + " s")); }
     held.forEach((h, i) => {
