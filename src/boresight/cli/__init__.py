@@ -20,6 +20,7 @@ app = App(
 
 # One line a command: module:function, and the sentence that `boresight --help` shows.
 COMMANDS: dict[str, tuple[str, str]] = {
+    "demo": ("boresight.cli.demo:demo", "Simulate, track, score and report an example: see it work."),
     "import": ("boresight.cli.import_:app", "Turn other formats into a recording."),
     "simulate": ("boresight.cli.simulate:simulate", "Turn a scenario into a recording with truth."),
     "track": ("boresight.cli.track:track", "Track the targets of a recording."),

@@ -60,11 +60,14 @@ def _tracks(rows: TrackRows, first: float) -> tuple[list[dict[str, Any]], int]:
     ids, starts = np.unique(rows.track_id[order], return_index=True)
     ends = np.append(starts, len(order))[1:]
     step = strides((ends - starts).tolist(), MAX_TRACK_POINTS)
+    changed = np.flatnonzero(np.diff(rows.status[order].astype(np.int64))) + 1  # rows where a status begins
+    if len(changed) > MAX_TRACK_POINTS // 4:
+        changed = changed[:0]
     out = []
     for track, begin, end in zip(ids.tolist(), starts.tolist(), ends.tolist(), strict=True):
         of = order[begin:end]
-        mark = np.flatnonzero(np.diff(rows.status[of].astype(np.int64))) + 1  # keep where the status changes
-        keep = of[np.unique(np.concatenate([every(len(of), step), mark if step < 50 else mark[:1]]))]
+        mark = changed[np.searchsorted(changed, begin) : np.searchsorted(changed, end)] - begin
+        keep = of[np.unique(np.concatenate([every(len(of), step), mark]))]
         entry = {"id": track, **_path(rows.t[keep] - first, rows.position[keep]), "s": rows.status[keep].tolist()}
         entry["v"] = whole(np.linalg.norm(np.nan_to_num(rows.velocity[keep]), axis=1), 10.0)
         out.append(entry)

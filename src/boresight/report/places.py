@@ -31,7 +31,9 @@ def places_of(recording: Recording, sensor: int) -> Places:
     t = d.t[row] - declared.latency
     platform = next((p for p in recording.platforms if p.id == declared.platform), None)
     try:
-        track = pose_track(platform, max_extrapolation=10.0, max_gap=60.0) if platform is not None else None
+        track = None
+        if platform is not None:
+            track = pose_track(platform, recording.site, max_extrapolation=10.0, max_gap=60.0)
         if track is not None:
             ok = track.usable(t, attitude=track.has_attitude)
             row, t = row[ok], t[ok]

@@ -1,0 +1,110 @@
+"""`boresight demo`: simulate radar and infrared on two aircraft, track, score, write the report."""
+
+from __future__ import annotations
+
+import sys
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from boresight.cli.output import print_json, print_table
+from boresight.io.files import output_folder
+from boresight.io.recording import write_recording
+from boresight.io.results import write_results
+from boresight.types import Results
+
+SET = "P"
+COLUMNS = {
+    "time_s": "time\ns",
+    "radar_rmse_m": "radar alone\nerror m",
+    "radar_bound_m": "\nbound m",
+    "ir_rmse_m": "IR alone\nerror m",
+    "ir_bound_m": "\nbound m",
+    "both_rmse_m": "both\nerror m",
+    "both_bound_m": "\nbound m",
+    "both_ratio": "\nratio",
+}
+
+
+def demo(
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])] = Path("demo"),
+    runs: int = 200,
+    seed: int = 7,
+    force: bool = False,
+    json: bool = False,
+) -> None:
+    """Simulate a UAV with radar and infrared meeting another aircraft, track it, and write the report.
+
+    The table compares the filter's position error, second by second, with the Cramér-Rao bound: radar alone, infrared
+    alone, both (shao2012, noise set P).
+
+    Parameters
+    ----------
+    output
+        Folder for recording, tracks and report.html.
+    runs
+        Monte Carlo runs of the table.
+    seed
+        Seed of the random numbers.
+    force
+        Replace the output folder.
+    json
+        Print one JSON object instead of text.
+    """
+    if runs < 2 or seed < 0:
+        from boresight.errors import UserError
+
+        raise UserError("--runs must be 2 or more, --seed 0 or more")
+    with output_folder(output, force) as folder:
+        results = _tracked(folder, output, seed)
+        _say(json, f"comparing the filter with the bound over {runs} runs …")
+        rows = _table(runs, seed)
+    report = output / "report.html"
+    if json:
+        print_json("demo", {"runs": runs, "seed": seed, "set": SET, "report": str(report)}, rows)
+        return
+    print_table(COLUMNS, rows, title="Position error (RMSE) and Cramér-Rao bound", digits=3)
+    counts = results.summary["counts"]
+    print(f"the recording: {counts['reports']} reports, {counts['tracks']} tracks; to score it again:")
+    print(f"  boresight score {output} {output / 'recording'}")
+    print(f"the report: {report}")
+
+
+def _say(quiet: bool, text: str) -> None:
+    if not quiet:
+        print(f"boresight: {text}", file=sys.stderr, flush=True)
+
+
+def _tracked(folder: Path, output: Path, seed: int) -> Results:
+    """Write scenario, recording, tracks and report into `folder`."""
+    import numpy as np
+
+    from boresight.cli.track import track_recording
+    from boresight.config.scenario import read_scenario
+    from boresight.report.html import write_report
+    from boresight.sim.scenario import simulate
+    from boresight.tracking.config import TrackerConfig
+
+    with as_file(files("boresight.cli") / "demo.toml") as path:
+        scenario, _ = read_scenario(path, seed)
+        (folder / "scenario.toml").write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+    recording = simulate(scenario, np.random.default_rng(seed))
+    write_recording(recording, folder / "recording")
+    results = track_recording(recording, TrackerConfig())
+    results.summary["command"] = f"boresight demo -o {output} --seed {seed}"
+    results.summary["recording_folder"] = str(output / "recording")
+    write_results(results, recording, folder)
+    write_report(folder / "report.html", results, recording)
+    return results
+
+
+def _table(runs: int, seed: int) -> list[dict[str, Any]]:
+    import numpy as np
+
+    from boresight.papers.shao2012.scenario import SETS
+    from boresight.papers.shao2012.seconds import per_second
+
+    return per_second(SETS[SET], runs, np.random.default_rng(seed))
