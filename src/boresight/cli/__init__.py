@@ -27,6 +27,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "tune": ("boresight.cli.tune:tune", "Find process and measurement noise from a recording's innovations."),
     "score": ("boresight.cli.score:score_command", "Score tracks against the truth of their recording."),
     "report": ("boresight.cli.report:report", "Write a page that shows what the tracker did."),
+    "play": ("boresight.cli.play:play", "Replay tracks in the terminal, or as GIF, MP4 or PNG."),
     "info": ("boresight.cli.info:info", "Say what is in a recording."),
     "export": ("boresight.cli.export:export", "Write tracks as CSV, GeoJSON or KML."),
     "convert": ("boresight.cli.convert:convert", "Turn pixels, az/el, ENU, NED, ECEF and geodetic into each other."),

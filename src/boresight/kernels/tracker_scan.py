@@ -245,9 +245,7 @@ def grown_int(a: IntArray, room: int) -> IntArray:
 
 
 @njit(cache=True)
-def evidence(
-    i: int, start: IntArray, column: IntArray, loglik: FloatArray, row_of_col: IntArray, p_d: float
-) -> float:
+def evidence(i: int, start: IntArray, column: IntArray, loglik: FloatArray, row_of_col: IntArray, p_d: float) -> float:
     """Log-likelihood of this look if track `i` is a visible target, over that if it is not: missed, or any of the
     detections in its gate that no other track took (Musicki, Evans, Stankovic 1994, the IPDA likelihood ratio)."""
     total = 1.0 - p_d
