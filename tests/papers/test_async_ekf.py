@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from boresight.papers.async_ekf import doppler
 from boresight.papers.async_ekf.table import table
 
 
@@ -33,6 +34,14 @@ def test_small() -> None:
     # a relative deviation of an RMS of 2 %, of ANEES 2.5 %; slack of two of them beyond the limits
     check_s0(by_method("S0", 12), 0.05)
     check_s2(by_method("S2", 12), 0.04)
+
+
+def test_doppler_and_temperature() -> None:
+    rows = {row["method"]: row for row in doppler.table(6, seed=1)}
+    assert rows["doppler"]["velocity_m_s"] < rows["no_doppler"]["velocity_m_s"]
+    assert rows["doppler"]["swapped"] > 0.1  # two targets within a metre: kinematics cannot tell them apart
+    assert rows["doppler_temperature"]["swapped"] < 0.08
+    assert rows["doppler_temperature"]["anees_per_dim"] < 3.0
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ COLUMNS = {
     "velocity_m_s": "velocity\nm/s",
     "position_ratio": "position\n/bound",
     "anees_per_dim": "ANEES\n/dim",
+    "swapped": "swapped\nshare",
 }
 
 
@@ -21,7 +22,8 @@ def async_ekf(*, scenario: str = "all", runs: int = 500, seed: int = 1, json: bo
     Parameters
     ----------
     scenario
-        S0 (truth drawn from the model), S2 (the paper's path), or all.
+        S0 (truth drawn from the model), S2 (the paper's path), doppler (the paper's sensors as listed: no elevation,
+        range rate, temperature; two targets, at most 50 runs), or all.
     runs
         Monte Carlo runs of each scenario.
     seed
@@ -29,18 +31,21 @@ def async_ekf(*, scenario: str = "all", runs: int = 500, seed: int = 1, json: bo
     json
         Print one JSON object instead of a table.
     """
+    from boresight.papers.async_ekf import doppler
     from boresight.papers.async_ekf.scenario import SCENARIOS
     from boresight.papers.async_ekf.table import table
 
-    names = list(SCENARIOS) if scenario == "all" else [scenario]
-    if not set(names) <= set(SCENARIOS):
-        known = [*SCENARIOS, "all"]
+    known = [*SCENARIOS, "doppler", "all"]
+    names = known[:-1] if scenario == "all" else [scenario]
+    if scenario not in known:
         raise UserError(
             f"--scenario must be one of {', '.join(known)}, not '{scenario}'{did_you_mean(scenario, known)}"
         )
     if runs < 1:
         raise UserError(f"--runs must be at least 1, not {runs}")
-    rows = [row for name in names for row in table(name, runs, seed)]
+    rows = [
+        row for name in names for row in (doppler.table(runs, seed) if name == "doppler" else table(name, runs, seed))
+    ]
     if json:
         print_json("paper async_ekf", {"scenario": scenario, "runs": runs, "seed": seed}, rows)
         return
