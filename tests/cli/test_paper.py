@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -32,9 +33,21 @@ def test_shao2012_json() -> None:
     assert methods >= {"ir_only", "rts"}
 
 
+def test_plot_over_time(tmp_path: Path) -> None:
+    done = boresight("paper", "shao2012", "--runs", "2", "--plot", str(tmp_path / "a.svg"))
+    assert done.returncode == 0, done.stderr
+    assert "bound" in done.stdout
+    assert (tmp_path / "a.svg").read_text().count("<path") > 20
+    assert [p.name for p in tmp_path.iterdir()] == ["a.svg"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
-    [(("--set", "X"), "--set must be one of A"), (("--runs", "0"), "--runs must be at least 1")],
+    [
+        (("--set", "X"), "--set must be one of A"),
+        (("--runs", "0"), "--runs must be at least 1"),
+        (("--plot", "a.xyz"), "must end in"),
+    ],
 )
 def test_mistakes_end_with_one_line(arguments: tuple[str, ...], message: str) -> None:
     done = boresight("paper", "shao2012", *arguments)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
@@ -40,6 +41,7 @@ def shao2012(
     set_: Annotated[str, Parameter(name="--set")] = "A",
     runs: int = 500,
     seed: int = 1,
+    plot: Path | None = None,
     json: bool = False,
 ) -> None:
     """Print shao2012's table: every method's RMS error over 3–6 s, its ratio to the Cramér–Rao bound, consistency.
@@ -53,6 +55,8 @@ def shao2012(
         Monte Carlo runs.
     seed
         Of the random numbers.
+    plot
+        Image file (.svg, .png, .pdf) to write with the errors over time; for the sets only.
     json
         Print one JSON object instead of a table.
     """
@@ -64,6 +68,8 @@ def shao2012(
         raise UserError(f"--set must be one of {', '.join(known)}, not '{set_}'{did_you_mean(set_, known)}")
     if runs < 1:
         raise UserError(f"--runs must be at least 1, not {runs}")
+    if plot is not None:
+        _plot(plot, set_, runs, seed)
     rows = _rows(set_, runs, seed)
     if json:
         print_json("paper shao2012", {"set": set_, "runs": runs, "seed": seed}, rows)
@@ -81,3 +87,20 @@ def _rows(name: str, runs: int, seed: int) -> list[dict[str, Any]]:
     if name in CASES:
         return CASES[name](runs, np.random.default_rng(seed))
     return table(name, runs, seed)
+
+
+def _plot(path: Path, name: str, runs: int, seed: int) -> None:
+    from boresight.papers.shao2012.plot import plot
+    from boresight.papers.shao2012.scenario import SETS
+
+    if name not in SETS:
+        raise UserError(f"--plot shows the sets {', '.join(SETS)}, not '{name}'")
+    kinds = (".svg", ".png", ".pdf")
+    if path.suffix not in kinds:
+        raise UserError(f"--plot {path}: the file must end in {', '.join(kinds)}")
+    part = path.with_name(f".part{path.suffix}")
+    try:
+        plot(part, name, runs, seed)
+        part.replace(path)
+    except OSError as error:
+        raise UserError(f"--plot {path}: cannot be written ({(error.strerror or str(error)).lower()})") from None

@@ -17,7 +17,7 @@ from boresight.kernels.stream import ekf_stream
 from boresight.kernels.unscented import ukf_stream
 from boresight.models import Infrared, Radar
 from boresight.papers.montecarlo import Estimates, nees, wrapped
-from boresight.papers.shao2012.scenario import Data, IndexArray, MaskArray, Setup, own_ship, pose, scored
+from boresight.papers.shao2012.scenario import Data, IndexArray, MaskArray, Setup, own_ship, pose
 from boresight.types.sensor import FloatArray
 
 UNSCENTED = np.array([1.0, 0.0, 0.0])  # cubature points
@@ -72,7 +72,7 @@ def cartesian(
 
 def _epochs(data: Data, chosen: MaskArray) -> IndexArray:
     """Indices, among the chosen reports, of the last report at each scored time."""
-    times = data.t[scored(data.t, data.is_radar)]
+    times = data.t[data.scored()]
     return np.asarray(np.searchsorted(data.t[chosen], times + 1e-9) - 1)
 
 
@@ -102,7 +102,7 @@ def _msc(
 
 def msc(setup: Setup, data: Data) -> Estimates:
     """The MSC filter on every report at its own time."""
-    at = scored(data.t, data.is_radar)
+    at = data.scored()
     return _msc(setup, data.reports, data.own, data.truth[:, at], at, EXACT)
 
 
@@ -122,7 +122,7 @@ def pipeline(setup: Setup, data: Data, with_range: bool, variant: int = EXACT) -
     if with_range:
         z[:, :, 0] = data.z[:, at, 0]
     context = np.array([sensor.at(pose(own)).context for own in data.own[at]])
-    epochs = scored(data.t[at], data.is_radar[at])
+    epochs = np.flatnonzero(np.isin(at, data.scored()))
 
     def reports(run: int) -> Reports:
         return Reports(data.t[at], z[run], context, Radar.kernel)

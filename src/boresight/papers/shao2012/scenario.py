@@ -102,17 +102,17 @@ class Data(NamedTuple):
     own: FloatArray  # (k, 6)
     z: FloatArray  # (runs, k, 7)
     context: FloatArray  # (k, c)
+    window: tuple[float, float] = SCORED  # s
+
+    def scored(self) -> IndexArray:
+        """Return the indices of the reports at whose time figures are taken: the radar's, within the window."""
+        inside = (self.t > self.window[0] - 1e-9) & (self.t < self.window[1] + 1e-9)
+        return np.flatnonzero(inside & self.is_radar)
 
     def reports(self, run: int, only: MaskArray | None = None) -> Reports:
         """Return the reports of one run, or those that `only` (k,) selects."""
         at = np.ones(len(self.t), bool) if only is None else only
         return Reports(self.t[at], self.z[run][at], self.context[at], Radar.kernel)
-
-
-def scored(t: FloatArray, is_radar: MaskArray) -> IndexArray:
-    """Return the indices of the reports at whose time figures are taken: the radar's, within the scored seconds."""
-    inside = (t > SCORED[0] - 1e-9) & (t < SCORED[1] + 1e-9)
-    return np.flatnonzero(inside & is_radar)
 
 
 def simulate(setup: Setup, runs: int, rng: np.random.Generator) -> Data:
