@@ -118,7 +118,12 @@ def import_autoferry(detections: Path, truth: Path | None = None, ignore: Path |
     where = str(detections)
     looks = _looks(entries, detections)
     return assemble(
-        Declaration(detections.stem, 2, site_of(SITE, where), tuple(sensor_of(s, where) for s in SENSORS.values())),
+        Declaration(
+            detections.stem.removesuffix("_detections"),
+            2,
+            site_of(SITE, where),
+            tuple(sensor_of(s, where) for s in SENSORS.values()),
+        ),
         check_table(Table(detections, pa.table(looks)), SCHEMA, REQUIRED),
         platform=Table(detections, pa.table(_ownship(entries))),
         truth=_truth(truth, len(entries)) if truth is not None else None,

@@ -16,15 +16,17 @@ BINS = 60
 
 def binned(t: FloatArray, value: FloatArray, dof: NDArray[np.int64], first: float, last: float) -> dict[str, Any]:
     """Return means of value/dof in even bins of time, and the 95 % band of each mean (chi-square, independent)."""
-    width = max(last - first, 1e-9) / BINS
-    index = np.clip(((t - first) / width).astype(np.int64), 0, BINS - 1)
-    total = np.bincount(index, dof, minlength=BINS)
-    summed = np.bincount(index, value, minlength=BINS)
+    bins = int(np.clip(len(np.unique(t)) // 2, 4, BINS))
+    width = max(last - first, 1e-9) / bins
+    index = np.clip(((t - first) / width).astype(np.int64), 0, bins - 1)
+    total = np.bincount(index, dof, minlength=bins)
+    summed = np.bincount(index, value, minlength=bins)
     have = total > 0
     n = total[have]
     low, high = chi2.ppf([[0.025], [0.975]], n) / n if len(n) else (np.zeros(0), np.zeros(0))
     centre = (np.flatnonzero(have) + 0.5) * width
     return {
+        "w": round(width, 3),
         "t": np.round(centre, 3).tolist(),
         "v": _short(summed[have] / n),
         "lo": _short(low),

@@ -144,7 +144,7 @@ $("about").textContent = `${D.dimensions}-D, ${sig(span, 4)} s` + (sensors.lengt
 const scores = D.scores || [], own = scores.find(r => r.item === "tracks"), none = scores.find(r => r.item === "empty tracker");
 const counts = D.summary.counts || {};
 const tiles = [[String(D.tracks.length), "tracks"], [String(counts.reports ?? D.outcome.reduce((a, r) => a + r.rows, 0)), "reports"]];
-if (own) tiles.push([sig(own.gospa_rms_m, 3) + " m", `GOSPA RMS (empty tracker ${sig(none.gospa_rms_m, 3)})`],
+if (own) tiles.push([sig(own.gospa_rms_m, 3) + " m", `GOSPA RMS, cut off at 20 m (empty tracker ${sig(none.gospa_rms_m, 3)})`],
   [own.tracked_fraction === null ? "–" : sig(100 * own.tracked_fraction, 3) + " %", "of the time tracked"], [sig(own.position_rmse_m, 3) + (own.position_rmse_m === null ? "" : " m"), "position RMSE"],
   [sig(own.false_track_s, 3) + " s", "of false tracks"], [sig(own.nees_mean, 3), `NEES (${D.dimensions} is right)`]);
 for (const [v, w] of tiles) $("tiles").append(make("div", {class: "tile"}, make("b", {}, v), make("span", {}, w)));
@@ -407,7 +407,7 @@ if (own) {
     const cell = make("div"); $("nis").append(cell);
     const mean = row ? (row.item === "sensor" ? row.nis_per_dof : row.nees_mean / D.dimensions) : null, part = row ? (row.item === "sensor" ? row.nis_in_band_95 : row.nees_in_band_95) : null;
     const top = Math.max(2.2, ...n.v.slice().sort((a, b) => a - b).slice(0, Math.ceil(0.95 * n.v.length)).map(v => 1.15 * v), ...n.hi.slice().sort((a, b) => a - b).slice(0, Math.ceil(n.hi.length / 2)));
-    chart(cell, {title: title + (mean === null ? "" : `: mean ${sig(mean, 3)}, ${sig(100 * part, 3)} % in the single 95 % band`), series: [{x: n.t, y: n.v, colour, label: "mean"}], bands: [{x: n.t, lo: n.lo, hi: n.hi, colour: "#2f7d4f", opacity: 0.16}], lines: [1], x: [0, span], y: [0, top], gap: span / 15, height: 150});
+    chart(cell, {title: title + (mean === null ? "" : `: mean ${sig(mean, 3)}, ${sig(100 * part, 3)} % in the single 95 % band`), series: [{x: n.t, y: n.v, colour, label: "mean"}], bands: [{x: n.t, lo: n.lo, hi: n.hi, colour: "#2f7d4f", opacity: 0.16}], lines: [1], x: [0, span], y: [0, top], gap: 3.5 * n.w, height: 150});
   }
 })();
 
