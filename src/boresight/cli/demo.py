@@ -31,7 +31,7 @@ COLUMNS = {
 def demo(
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])] = Path("demo"),
-    runs: int = 200,
+    runs: int = 400,
     seed: int = 7,
     force: bool = False,
     json: bool = False,
@@ -59,9 +59,9 @@ def demo(
 
         raise UserError("--runs must be 2 or more, --seed 0 or more")
     with output_folder(output, force) as folder:
-        results = _tracked(folder, output, seed)
         _say(json, f"comparing the filter with the bound over {runs} runs …")
         rows = _table(runs, seed)
+        results = _tracked(folder, output, seed, rows)
     report = output / "report.html"
     if json:
         print_json("demo", {"runs": runs, "seed": seed, "set": SET, "report": str(report)}, rows)
@@ -78,7 +78,7 @@ def _say(quiet: bool, text: str) -> None:
         print(f"boresight: {text}", file=sys.stderr, flush=True)
 
 
-def _tracked(folder: Path, output: Path, seed: int) -> Results:
+def _tracked(folder: Path, output: Path, seed: int, bound: list[dict[str, Any]]) -> Results:
     """Write scenario, recording, tracks and report into `folder`."""
     import numpy as np
 
@@ -96,6 +96,7 @@ def _tracked(folder: Path, output: Path, seed: int) -> Results:
     results = track_recording(recording, TrackerConfig())
     results.summary["command"] = f"boresight demo -o {output} --seed {seed}"
     results.summary["recording_folder"] = str(output / "recording")
+    results.summary["bound"] = bound
     write_results(results, recording, folder)
     write_report(folder / "report.html", results, recording)
     return results

@@ -149,6 +149,13 @@ if (own) tiles.push([sig(own.gospa_rms_m, 3) + " m", `GOSPA RMS, cut off at 20 m
   [sig(own.false_track_s, 3) + " s", "of false tracks"], [sig(own.nees_mean, 3), `NEES (${D.dimensions} is right)`]);
 for (const [v, w] of tiles) $("tiles").append(make("div", {class: "tile"}, make("b", {}, v), make("span", {}, w)));
 
+// ---------- bound
+if (D.summary.bound && D.summary.bound.length) {
+  const rows = D.summary.bound, x = rows.map(r => r.time_s), kinds = [["radar", "radar alone", "#c4452f"], ["ir", "infrared alone", "#7a5195"], ["both", "both", "#0b6aa2"]];
+  chart($("bound"), {series: kinds.flatMap(([k, w, colour]) => [{x, y: rows.map(r => r[k + "_rmse_m"]), colour, width: 2.4, label: w + ", m"}, {x, y: rows.map(r => r[k + "_bound_m"]), colour, dash: "2 4", width: 2.4, label: w + " bound, m"}]), x: [x[0], x[x.length - 1]], y: [0, null], yl: "position error, m", height: 260});
+  $("bound").append(key(kinds.map(([, w, c]) => [c, w, true])));
+} else hide("bound-section");
+
 // ---------- plan view
 const canvas = $("plan"), ctx = canvas.getContext("2d"), tip = $("tip");
 const show = {tracks: true, truth: true, platforms: true, ignored: true};
