@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench lock clean
+.PHONY: help demo test check bench scoreboard lock clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1	/' | expand -t 16
@@ -37,6 +37,9 @@ check: $(VENV)/.test ## ruff, strict types, layers, doctests, docs
 
 bench: $(VENV)/.bench ## measure speed against the peers (Stone Soup, FilterPy, NumPy, SciPy)
 	$(BIN)/python -m benchmarks
+
+scoreboard: $(VENV)/.run ## the real recordings in ../shared/data, every sensor combination
+	$(BIN)/python -m benchmarks.scoreboard
 
 lock: ## pin the dependencies again (needs uv)
 	@printf 'hatchling>=1.27\neditables\n' > .build.in

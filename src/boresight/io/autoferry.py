@@ -30,10 +30,10 @@ SENSORS: dict[int, SensorTable] = {
         kind="lidar",
         platform=PLATFORM,
         axes="platform_enu",
-        sigma_position_m=1.5,
+        sigma_position_m=3.0,
         latency_s=0.4,
         period_s=0.5,
-        p_detection=0.7,
+        p_detection=0.5,
         clutter_per_scan=1.0,
         coverage=CoverageTable(range_m=(0.0, 120.0)),
     ),
@@ -42,7 +42,7 @@ SENSORS: dict[int, SensorTable] = {
         kind="radar",
         platform=PLATFORM,
         axes="platform_enu",
-        sigma_position_m=3.0,
+        sigma_position_m=2.4,
         latency_s=2.0,
         period_s=1.68,
         p_detection=0.8,
@@ -56,7 +56,7 @@ SENSORS: dict[int, SensorTable] = {
         axes="platform_enu",
         sigma_azimuth_deg=0.5,
         period_s=0.117,
-        p_detection=0.45,
+        p_detection=0.3,
         clutter_per_scan=2.0,
     ),
     4: SensorTable(
@@ -66,7 +66,7 @@ SENSORS: dict[int, SensorTable] = {
         axes="platform_enu",
         sigma_azimuth_deg=0.5,
         period_s=0.2,
-        p_detection=0.5,
+        p_detection=0.3,
         clutter_per_scan=3.0,
     ),
 }
@@ -77,30 +77,39 @@ TRACKER_TOML = """\
 # names another.
 [tracker]
 speed_sigma_m_s = 5.0
-doubt = 0.001
+birth_rate = 0.003
+show_time_s = 5.0
+static_share = 0.2
+static_wander_m2_s = 0.2
+stop_floor = 0.005
+doubt = 0.01
 confirm_above = 0.95
-hide_below = 0.8
+hide_below = 0.7
+merge_distance_m = 15.0
+clutter_memory_looks = 15.0
 
 [[sensor]]
 id = "radar"
-bias_position_m = 2.0
+bias_position_m = 1.5
 bias_time_s = 20.0
-report_range_m = 300.0
+resolution_m = 20.0
+report_range_m = 250.0
 
 [[sensor]]
 id = "lidar"
-bias_position_m = 0.8
+bias_position_m = 2.0
 bias_time_s = 20.0
+report_range_m = 60.0
 
 [[sensor]]
 id = "ir"
-bias_azimuth_deg = 3.0
+bias_azimuth_deg = 4.0
 bias_time_s = 40.0
 decorrelation_s = 2.0
 
 [[sensor]]
 id = "eo"
-bias_azimuth_deg = 3.0
+bias_azimuth_deg = 4.0
 bias_time_s = 40.0
 decorrelation_s = 2.0
 """

@@ -96,6 +96,7 @@ class Settings(NamedTuple):
     hide_below: float
     bias_sigma: FloatArray  # (n - 2d,)
     bias_tau: FloatArray  # (n - 2d,)
+    farthest_report: float  # m, the largest report range of the sensors in use
     merge_distance: float
     lonely_bearings: bool  # bearings update only where nobody else could claim them
     clutter_memory: float  # looks

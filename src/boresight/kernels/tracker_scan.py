@@ -553,7 +553,7 @@ def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look) -> None:
             gap += (tr.x[i, a] - look.sensor_position[last, a]) ** 2
         target = tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN]
         if tr.life[i, 2] > 0.0:
-            if gap > (1.1 * sensor.report_range) ** 2:
+            if sensor.report_range == s.farthest_report and gap > (1.1 * sensor.report_range) ** 2:
                 tr.life[i, 2] = 0.0
         elif target > s.show_above and gap < sensor.report_range**2:
             tr.life[i, 2] = 1.0

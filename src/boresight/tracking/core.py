@@ -95,6 +95,9 @@ def make_plan(
         hide_below=config.hide_below,
         bias_sigma=np.array(sigma),
         bias_tau=np.array(tau),
+        farthest_report=max(
+            [t.report_range for t in tables if t.ranging and (used is None or t.number in used)] or [0.0]
+        ),
         merge_distance=config.merge_distance if config.merge_distance is not None else (10.0 if flat else 30.0),
         lonely_bearings=config.lonely_bearings,
         clutter_memory=config.clutter_memory,
