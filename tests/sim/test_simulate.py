@@ -45,7 +45,7 @@ def expected(rec: Recording, i: int = 0, latency: float = 0.0) -> np.ndarray:
     truth, sensor = rec.truth[0], rec.sensors[i]
     rows = np.flatnonzero((rec.detections.sensor == i) & ~np.isnan(rec.detections.z).all(axis=1))
     t = rec.detections.t[rows] - latency
-    track = pose_track(rec.platforms[0]) if sensor.platform else None
+    track = pose_track(rec.platforms[0], rec.site) if sensor.platform else None
     s, v, R = sensor_pose(sensor, track, t)
     out, H = np.empty((len(t), 7)), np.empty((7, 6))
     for k in range(len(t)):
