@@ -18,15 +18,19 @@ def rows(case: str, runs: int) -> dict[Any, dict[str, Any]]:
 def test_cases(runs: int) -> None:
     slack = 1.2 if runs == 60 else 1.0  # an RMS over 60 runs has a relative deviation of 9 %; two of them
     weave = rows("weave", runs)
-    assert weave["msc", 5.0]["range_m"] < 50.0 * slack
-    assert weave["msc", 8.0]["range_m"] < 18.0 * slack
+    # range errors grow with the square of range, which differs by a factor of two between runs: one run in 500 with a
+    # target three sigma away can rule an RMS, so each error is also taken by that run's own bound
+    assert weave["msc", 5.0]["range_bound_m"] < 50.0
+    for at, most in ((5.0, 55.0), (8.0, 18.0)):
+        assert weave["msc", at]["range_m"] < most * slack
+        assert weave["msc", at]["range_over_bound"] < 1.05 * slack
     assert weave["msc", 8.0]["range_observable"] == 1.0
     straight = rows("straight", runs)
     for at in (5.0, 8.0):
         assert straight["msc", at]["range_observable"] == 0.0
-        assert straight["msc", at]["range_m"] / straight["msc", at]["range_sigma_reported_m"] == pytest.approx(
-            1.0, abs=0.2
-        )
+        # 1/r is skew where range is Gaussian: its moments overstate sigma by some 15 % here
+        consistent = straight["msc", at]["range_m"] / straight["msc", at]["range_sigma_reported_m"]
+        assert consistent == pytest.approx(0.87, abs=0.2 if runs == 60 else 0.1)
     diffuse = rows("diffuse", runs)
     # 60 runs x 6 degrees of freedom, correlated over the window: a deviation of ANEES/6 of about 7 %
     assert abs(diffuse["msc", "3-6"]["anees_per_dim"] - 1.0) < (0.2 if runs == 60 else 0.1)

@@ -30,6 +30,8 @@ CASE_COLUMNS = {
     "time_s": "time\ns",
     "position_m": "position\nm",
     "range_m": "range\nm",
+    "range_bound_m": "bound\nm",
+    "range_over_bound": "range\n/bound",
     "range_sigma_reported_m": "reported\nm",
     "range_observable": "range\nknown",
     "anees_per_dim": "ANEES\n/dim",

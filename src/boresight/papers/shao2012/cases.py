@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from boresight.bounds import trajectory_bound
 from boresight.filters.msc import KNOWN_RANGE, MscFilter, MscState
+from boresight.filters.stream import Reports
 from boresight.kernels.msc import cartesian_from_msc, inverse_jacobian
 from boresight.kernels.msc_stream import EXACT, msc_from_world, msc_stream
 from boresight.kernels.stream import ekf_stream
@@ -110,6 +112,26 @@ def _spherical(case: Case, prior: MscState, data: tuple[FloatArray, ...]) -> tup
     return means, consistency, sigma
 
 
+def _range_bound(case: Case, start: FloatArray, prior: GaussianState, data: tuple[FloatArray, ...]) -> FloatArray:
+    """Return the Cramér-Rao bound on range (runs, k) on each run's true path."""
+    t, z, context, own = data
+    out = np.empty((len(z), len(t)))
+    for run in range(len(z)):
+        reports = Reports(t, z[run], context, Radar.kernel)
+        P = trajectory_bound(prior._replace(x=start[run]), case.motion, reports, case.truth[run])
+        u = case.truth[run, :, :3] - own[:, :3]
+        u /= np.linalg.norm(u, axis=1)[:, None]
+        out[run] = np.sqrt(np.einsum("ki,kij,kj->k", u, P[:, :3, :3], u))
+    return out
+
+
+def _in_msc(prior: GaussianState, own0: FloatArray, rng: np.random.Generator) -> MscState:
+    """Return the prior's mean and covariance in MSC, by draws: with range this uncertain a Jacobian is not enough."""
+    draws = prior.x + rng.normal(size=(20_000, 6)) @ np.linalg.cholesky(prior.P).T
+    y = np.array([msc_from_world(x, own0) for x in draws])
+    return MscState(prior.t, y.mean(axis=0), np.cov(y.T), own0)
+
+
 def _range_error(case: Case, means: FloatArray) -> FloatArray:
     return np.asarray(polar(means - case.own)[..., 0] - polar(case.truth - case.own)[..., 0])
 
@@ -120,11 +142,10 @@ def weave(runs: int, rng: np.random.Generator, weaving: bool = True) -> list[dic
     prior = setup.prior
     start = prior.x + rng.normal(size=(runs, 6)) @ np.linalg.cholesky(prior.P).T
     case = Case(start, setup.motion, 8.0, weaving, rng)
-    y0 = msc_from_world(prior.x, case.own0)
-    inverse = inverse_jacobian(y0)
-    spherical = MscState(0.0, y0, inverse @ prior.P @ inverse.T, case.own0)
+    spherical = _in_msc(prior, case.own0, rng)
     means, consistency, sigma = _spherical(case, spherical, case.infrared())
     plain, plain_nees = _cartesian(case, prior, case.infrared())
+    limits = _range_bound(case, start, prior, case.infrared())
     rows = []
     for at in (2.0, 5.0, 8.0):
         k = round(at * RATE) - 1
@@ -140,6 +161,8 @@ def weave(runs: int, rng: np.random.Generator, weaving: bool = True) -> list[dic
             row: dict[str, Any] = {
                 "method": method,
                 "range_m": finite(rms(error)),
+                "range_bound_m": rms(limits[:, k]),
+                "range_over_bound": finite(rms(error / limits[:, k])),
                 "anees_per_dim": finite(n[:, k].mean() / 6),
             }
             rows.append(common | row | (reported if method == "msc" else {}))
