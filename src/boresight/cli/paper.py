@@ -11,6 +11,7 @@ PAPERS: dict[str, tuple[str, str]] = {
     "shao2012": ("boresight.cli.paper_shao2012:shao2012", "Radar and infrared in modified spherical coordinates."),
     "async_ekf": ("boresight.cli.paper_async_ekf:async_ekf", "Radar and infrared at different times."),
     "wang2009": ("boresight.cli.paper_wang2009:wang2009", "Pixels of a moving camera, steadied: the paper's 8 frames."),
+    "phased_array": ("boresight.cli.paper_phased_array:phased_array", "Several guide sources steer one beam."),
 }
 
 for _name, (_target, _help) in PAPERS.items():

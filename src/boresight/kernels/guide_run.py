@@ -1,0 +1,227 @@
+"""The guide filter over reports in order of arrival: one step, one prediction, or a whole run in one call."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from boresight.kernels.guide import ACCELERATION, DIRECTION, EARTH_RATE, ORBIT, advance, spin
+from boresight.kernels.guide_update import Work, bring_to, report_position, start, update, work_space
+from boresight.types.sensor import FloatArray
+
+# Where a filter's settings and running numbers stand in their arrays.
+S_DYNAMICS, S_Q, S_GATE, S_FORGET, S_MAX_AGE, S_RESTART = range(6)
+C_TIME, C_STARTED, C_REJECTED, C_BEST, C_RESTARTS, C_COUNT = range(6)
+N_CLOCK = 6
+FURTHEST = 50.0  # how far one hypothesis may lead another (log-likelihood)
+RESTING = -1e9
+ASLEEP = -8.0  # one that is further back rests, once the filter has settled …
+SETTLED = 60.0  # … after so many reports
+WAKE = 4.0  # rejections of one source in a row that wake the hypothesis that it is biased
+ACCEPTED, REJECTED, WAITING, STALE = 0, 1, 2, 3
+
+
+@njit(cache=True)
+def step(
+    clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, scale: FloatArray, run_of: FloatArray,
+    settings: FloatArray, spread: FloatArray, source: int, kind: int, t: float, z: FloatArray, origin: FloatArray,
+    axes: FloatArray,
+    sigma: FloatArray, sigma_bias: FloatArray, work: Work,
+) -> int:  # fmt: skip
+    """Take one report into every hypothesis; returns ACCEPTED, REJECTED, WAITING (no start yet) or STALE.
+
+    `sigma` (2,) is the report's: across (rad) and range (m) for a direction, per axis (m) for a position. `scale` (s,)
+    is the learned factor on each source's variance, `run_of` (s,) its run of rejections. Hypothesis 0 has no bias,
+    hypothesis 1 + s one of source s, with the prior `sigma_bias` (s,) (m; 0: the source has none).
+    """
+    dynamics, q = int(settings[S_DYNAMICS]), settings[S_Q]
+    if clock[C_STARTED] == 0.0 and not _begin(clock, X, P, L, dynamics, sigma_bias, spread, kind, t, z, origin, axes):
+        return WAITING
+    _bring_all(clock, X, P, L, dynamics, q, t, work)
+    if t < clock[C_TIME] - settings[S_MAX_AGE]:
+        return STALE
+    R = np.empty(3)
+    a = sigma[0] ** 2 * scale[source]
+    R[0] = R[1] = a
+    R[2] = a if kind != DIRECTION else sigma[1] ** 2 * scale[source]
+    best = int(clock[C_BEST])
+    fate = REJECTED
+    nis, share, k = 0.0, 0.0, 2
+    for h in range(len(X)):
+        if L[h] <= RESTING:
+            continue
+        e, l, d, s = update(
+            X[h],
+            P[h],
+            t - clock[C_TIME],
+            h == source + 1,
+            dynamics,
+            q,
+            kind,
+            t,
+            z,
+            origin,
+            axes,
+            R,
+            settings[S_GATE],
+            work,
+        )
+        L[h] += l
+        if h == best:
+            nis, k, share = e, d, s
+            fate = ACCEPTED if e <= settings[S_GATE] else REJECTED
+    _weigh(clock, L)
+    if fate == ACCEPTED:
+        # the noise explains `share` of S: learn only as much of the surprise
+        gain = settings[S_FORGET] * share
+        scale[source] = min(max(scale[source] * (1.0 + gain * (nis / k - 1.0)), 0.1), 100.0)
+        clock[C_REJECTED] = max(clock[C_REJECTED] - 1.0, 0.0)
+        run_of[source] = 0.0
+    else:
+        clock[C_REJECTED] += 1.0
+        run_of[source] += 1.0
+        if run_of[source] >= WAKE and sigma_bias[source] > 0.0 and L[source + 1] <= RESTING:
+            _wake(X, P, L, best, source, sigma_bias[source])
+            run_of[source] = 0.0
+        if clock[C_REJECTED] >= settings[S_RESTART]:
+            clock[C_STARTED] = 0.0
+            clock[C_RESTARTS] += 1.0
+    return fate
+
+
+@njit(cache=True)
+def _begin(
+    clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, dynamics: int, sigma_bias: FloatArray,
+    spread: FloatArray, kind: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray,
+) -> bool:  # fmt: skip
+    where, here, velocity = np.empty(3), np.empty(3), np.zeros(3)
+    if not report_position(kind, t, z, origin, axes, where):
+        return False
+    spin(t, where, here)
+    if dynamics == ACCELERATION:  # at rest on the Earth
+        velocity[0], velocity[1] = -EARTH_RATE * here[1], EARTH_RATE * here[0]
+    start(X, P, here, velocity, spread, sigma_bias)
+    L[:] = 0.0
+    for h in range(1, len(L)):
+        if sigma_bias[h - 1] == 0.0:
+            L[h] = RESTING
+    clock[C_TIME], clock[C_STARTED], clock[C_REJECTED], clock[C_BEST], clock[C_COUNT] = t, 1.0, 0.0, 0.0, 0.0
+    return True
+
+
+@njit(cache=True)
+def _bring_all(
+    clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, dynamics: int, q: float, t: float, work: Work,
+) -> None:  # fmt: skip
+    """Advance the hypotheses that do not rest to `t`, if that is later."""
+    now = clock[C_TIME]
+    for h in range(len(X)):
+        if L[h] > RESTING:
+            clock[C_TIME] = now
+            bring_to(clock, X[h : h + 1], P[h : h + 1], dynamics, q, t, work)
+    clock[C_TIME] = max(now, t)
+    clock[C_COUNT] += 1.0
+
+
+@njit(cache=True)
+def _wake(X: FloatArray, P: FloatArray, L: FloatArray, best: int, source: int, sigma_bias: float) -> None:
+    """Start the hypothesis that `source` is biased from the best one, with the bias unknown."""
+    h, m = source + 1, X.shape[1] - 3
+    X[h], P[h] = X[best], P[best]
+    X[h, m:] = 0.0
+    P[h, m:, :] = 0.0
+    P[h, :, m:] = 0.0
+    for i in range(m, m + 3):
+        P[h, i, i] = sigma_bias**2
+    L[h] = 0.5 * ASLEEP
+
+
+@njit(cache=True)
+def _weigh(clock: FloatArray, L: FloatArray) -> None:
+    """Count the log-likelihoods from the best one's, and lay to rest what is far behind."""
+    best = 0
+    for h in range(1, len(L)):
+        if L[h] > RESTING and (L[best] <= RESTING or L[h] > L[best]):
+            best = h
+    top = L[best]
+    for h in range(len(L)):
+        if L[h] > RESTING:
+            L[h] = max(L[h] - top, -FURTHEST)
+            if L[h] < ASLEEP and clock[C_COUNT] > SETTLED:
+                L[h] = RESTING
+    clock[C_BEST] = best
+
+
+@njit(cache=True)
+def predict_to(
+    clock: FloatArray, X: FloatArray, P: FloatArray, settings: FloatArray, t: float, position: FloatArray,
+    velocity: FloatArray, covariance: FloatArray, work: Work,
+) -> bool:  # fmt: skip
+    """Fill ECEF position, velocity (3,) (against the turning Earth) and covariance (3, 3) at `t`; false before start.
+
+    The state itself is left alone.
+    """
+    if clock[C_STARTED] == 0.0:
+        return False
+    best = int(clock[C_BEST])
+    dynamics, q = int(settings[S_DYNAMICS]), settings[S_Q]
+    m = X.shape[1] - 3
+    x = X[best].copy()
+    C = P[best].copy()
+    one, many, cov = np.array([clock[C_TIME]]), x.reshape(1, -1), C.reshape(1, m + 3, m + 3)
+    if t >= clock[C_TIME]:
+        bring_to(one, many, cov, dynamics, q, t, work)
+    else:
+        F = np.empty((m, m))
+        advance(x, dynamics, t - clock[C_TIME], F)
+    c, s = math.cos(EARTH_RATE * t), math.sin(EARTH_RATE * t)
+    position[0], position[1], position[2] = c * x[0] + s * x[1], c * x[1] - s * x[0], x[2]
+    velocity[0] = c * x[3] + s * x[4] + EARTH_RATE * position[1]
+    velocity[1] = c * x[4] - s * x[3] - EARTH_RATE * position[0]
+    velocity[2] = x[5]
+    for i in range(3):
+        for j in range(3):
+            covariance[i, j] = C[i, j]
+    for j in range(3):
+        a, b = covariance[0, j], covariance[1, j]
+        covariance[0, j], covariance[1, j] = c * a + s * b, c * b - s * a
+    for i in range(3):
+        a, b = covariance[i, 0], covariance[i, 1]
+        covariance[i, 0], covariance[i, 1] = c * a + s * b, c * b - s * a
+    return True
+
+
+@njit(cache=True)
+def run(
+    clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, scale: FloatArray, run_of: FloatArray,
+    settings: FloatArray, spread: FloatArray, source: NDArray[np.int64], kind: NDArray[np.int64], t: FloatArray,
+    t_recv: FloatArray,
+    z: FloatArray, origin: FloatArray, axes: FloatArray, sigma: FloatArray, sigma_bias: FloatArray,
+    t_node: FloatArray, t_aim: FloatArray, position: FloatArray, velocity: FloatArray, covariance: FloatArray,
+    best: NDArray[np.int64], fate: NDArray[np.int64],
+) -> None:  # fmt: skip
+    """Step through reports in order of arrival; at each node predict to its aim time from what had arrived.
+
+    Fills (k, 3), (k, 3), (k, 3, 3) per node, NaN before the start, the hypothesis in use, and each report's fate.
+    """
+    row = 0
+    work = work_space(X.shape[1])
+    for k in range(len(t_node)):
+        while row < len(t) and t_recv[row] <= t_node[k]:
+            fate[row] = step(
+                clock, X, P, L, scale, run_of, settings, spread, source[row], kind[row], t[row], z[row], origin[row],
+                axes[row], sigma[row], sigma_bias, work,
+            )  # fmt: skip
+            row += 1
+        if not predict_to(clock, X, P, settings, t_aim[k], position[k], velocity[k], covariance[k], work):
+            position[k] = velocity[k] = math.nan
+            covariance[k] = math.nan
+        best[k] = int(clock[C_BEST])
+
+
+def settings_of(orbit: bool, q: float, gate: float, forget: float, max_age: float, restart: int) -> FloatArray:
+    """Return the settings as the kernels take them."""
+    return np.array([ORBIT if orbit else ACCELERATION, q, gate, forget, max_age, float(restart)])
