@@ -105,13 +105,14 @@ def _outcome(decisions: DecisionRows, recording: Recording | None) -> list[dict[
 def _recorded(recording: Recording, results: Results, first: float, last: float) -> dict[str, Any]:
     truth_step = strides([len(p.t) for p in recording.truth], MAX_TRUTH_POINTS)
     way_step = strides([len(p.t) for p in recording.platforms], 4000)
+    contents = inventory(recording)
     data: dict[str, Any] = {
         "truth": [_thin(p.target, p.t - first, p.position, truth_step) for p in recording.truth],
         "platforms": [_thin(p.id, p.t - first, p.position, way_step) for p in recording.platforms],
         "ignore": [_thin(p.object, p.t - first, p.position, 1) for p in recording.ignore],
-        "inventory": inventory(recording),
+        "inventory": contents,
         "sensors": _detections(recording, results.decisions, first),
-        "looks": _looks(recording, first, last),
+        "looks": _looks(recording, contents, first, last),
         "nis": nis_of(recording, results.decisions, first, last),
     }
     if recording.truth:
@@ -147,9 +148,11 @@ def _detections(recording: Recording, decisions: DecisionRows, first: float) -> 
     return out
 
 
-def _looks(recording: Recording, first: float, last: float, bins: int = 120) -> list[dict[str, Any]]:
-    """Rows per even bin of time for each sensor: shows rates and gaps."""
+def _looks(recording: Recording, rows: list[dict[str, Any]], first: float, last: float) -> list[dict[str, Any]]:
+    """Rows per even bin of time for each sensor: shows rates and gaps. A bin holds two looks of the slowest sensor."""
     d = recording.detections
+    slowest = max([row["median_period_s"] or 0.0 for row in rows if row["item"] == "sensor"], default=0.0)
+    bins = int(np.clip((last - first) / max(2.0 * slowest, 1e-9), 20, 120))
     edges = np.linspace(first, max(last, first + 1e-9), bins + 1)
     return [
         {"id": s.id, "n": np.histogram(d.t[d.sensor == i], edges)[0].tolist()} for i, s in enumerate(recording.sensors)

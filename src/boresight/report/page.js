@@ -19,7 +19,7 @@ function sig(v, n = 4) {
   if (typeof v !== "number") return Array.isArray(v) ? v.map(w => sig(w, n)).join(", ") : String(v);
   if (Number.isInteger(v)) return String(v);
   const a = Math.abs(v);
-  return a >= 1e15 || a < 1e-3 ? v.toPrecision(3) : String(+v.toPrecision(a >= 10 ** n ? Math.ceil(Math.log10(a)) : n));
+  return a >= 1e15 || a < 1e-3 ? String(+v.toPrecision(3)) : String(+v.toPrecision(a >= 10 ** n ? Math.ceil(Math.log10(a)) : n));
 }
 function make(tag, attributes = {}, ...inner) {
   const e = document.createElement(tag);
@@ -456,7 +456,13 @@ if (D.inventory) {
 // ---------- how to repeat
 $("command").textContent = D.command || "boresight track REC -o OUT";
 const flat = [];
-(function walk(o, at) { for (const [k, v] of Object.entries(o || {})) v && typeof v === "object" && !Array.isArray(v) ? walk(v, at + k + ".") : flat.push({key: at + k, value: v}); })({parameters: D.summary.parameters, versions: D.summary.versions, window_s: D.summary.window_s, config_file: D.summary.config_file, seconds: D.summary.seconds}, "");
-$("parameters").append(make("details", {}, make("summary", {}, "parameters and versions"), table([["key", "key", true], ["value", "value"]], flat)));
+(function walk(o, at) {
+  for (const [k, v] of Object.entries(o || {})) {
+    const name = at + (v && v.id ? v.id : k);
+    if (v && typeof v === "object" && (!Array.isArray(v) || typeof v[0] === "object")) walk(v, name + ".");
+    else if (k !== "id") flat.push({key: name, value: v});
+  }
+})({parameters: D.summary.parameters, versions: D.summary.versions, window_s: D.summary.window_s, config_file: D.summary.config_file, seconds: D.summary.seconds}, "");
+$("parameters").append(make("details", {}, make("summary", {}, "parameters and versions"), table([["key", "key", true], ["value", "value", true]], flat)));
 addEventListener("beforeprint", () => document.querySelectorAll("details").forEach(d => d.open = true));
 })();
