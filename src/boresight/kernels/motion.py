@@ -16,6 +16,8 @@ from boresight.types.sensor import FloatArray
 
 CHAIN, SINGER, TURN, TURNING = 0, 1, 2, 3  # parameters[0]
 
+_FACTORIAL = (1.0, 1.0, 2.0, 6.0)
+
 # Gauss-Legendre nodes and weights on [0, 1]: exact to degree 19
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
@@ -46,6 +48,20 @@ def white_derivative(
     q = parameters[3]
     F[:, :] = 0.0
     Q[:, :] = 0.0
+    if order == 1:  # by far the most used: written out
+        for a in range(d):
+            F[a, d + a] = dt
+            F[a, a] = F[d + a, d + a] = 1.0
+            Q[a, a] = q * dt * dt * dt / 3.0
+            Q[a, d + a] = Q[d + a, a] = q * dt * dt / 2.0
+            Q[d + a, d + a] = q * dt
+            x_out[a] = x[a] + dt * x[d + a]
+            x_out[d + a] = x[d + a]
+        return
+    power = np.empty(2 * order + 2)
+    power[0] = 1.0
+    for i in range(1, 2 * order + 2):
+        power[i] = power[i - 1] * dt
     for i in range(order + 1):
         f = 1.0
         for j in range(i, order + 1):
@@ -55,7 +71,7 @@ def white_derivative(
                 F[i * d + a, j * d + a] = f
         for j in range(order + 1):
             p = 2 * order + 1 - i - j
-            value = q * dt**p / (p * math.gamma(order - i + 1.0) * math.gamma(order - j + 1.0))
+            value = q * power[p] / (p * _FACTORIAL[order - i] * _FACTORIAL[order - j])
             for a in range(d):
                 Q[i * d + a, j * d + a] = value
     _apply(F, x, x_out)
