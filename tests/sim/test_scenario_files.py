@@ -96,3 +96,22 @@ def test_bad_scenarios_are_refused_in_one_line(old: str, new: str, message: str,
         read_scenario(path)
     assert "\n" not in str(error.value)
     assert str(error.value).startswith(str(path))
+
+
+@pytest.mark.parametrize(
+    ("kind", "keys"),
+    [
+        ("nearly_constant_jerk", "q_m2_s7 = 1e-6"),
+        ("singer", "tau_s = 20.0\nsigma_m_s2 = 2.0"),
+        ("known_turn", "turn_rate_deg_s = 9.0"),
+        ("coordinated_turn", "turn_rate_deg_s = 9.0\nq_rate_deg2_s3 = 1e-6"),
+    ],
+)
+def test_every_motion_model_moves_a_target(kind: str, keys: str, tmp_path: Path) -> None:
+    text = GOOD.replace('kind = "nearly_constant_velocity"', f'kind = "{kind}"', 1).replace("q_m2_s3 = 0.1", keys, 1)
+    (tmp_path / "s.toml").write_text(text)
+    scenario, seed = read_scenario(tmp_path / "s.toml")
+    truth = simulate(scenario, np.random.default_rng(seed)).truth[0]
+    assert np.isfinite(truth.position).all()
+    if "turn" in kind:  # 90° to the right in 10 s: from east to south
+        np.testing.assert_allclose(truth.velocity[-1, :2], [0.0, -1.0], atol=0.01)

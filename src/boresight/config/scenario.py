@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -200,15 +201,23 @@ def _named(where: str, what: str, data: dict[str, Any], i: int, dimensions: int)
         if isinstance(body, WaypointsTable):
             return Target(head.id, body.build(head.birth_s), head.birth_s, head.death_s)
         assert isinstance(head, DrawnTable)
-        return _drawn(head.id, body.build(dimensions), head.position_enu_m, head.velocity_enu_m_s, head)
+        motion, rest = body.build(dimensions), body.rest(dimensions)
+        return _drawn(head.id, motion, head.position_enu_m, head.velocity_enu_m_s, head, rest)
     except UserError as error:
         raise UserError(f"{at}: {error}") from None
 
 
-def _drawn(name: str, motion: KernelMotion, position: Vector, velocity: Vector, life: TargetTable) -> Target:
+def _drawn(
+    name: str,
+    motion: KernelMotion,
+    position: Vector,
+    velocity: Vector,
+    life: TargetTable,
+    rest: Sequence[float] = (),
+) -> Target:
     d = motion.dimensions
     x0 = np.zeros(motion.state_dimension)
-    x0[:d], x0[d : 2 * d] = position[:d], velocity[:d]
+    x0[:d], x0[d : 2 * d], x0[2 * d : 2 * d + len(rest)] = position[:d], velocity[:d], rest
     return Target(name, Drawn(motion, x0), life.birth_s, life.death_s)
 
 
