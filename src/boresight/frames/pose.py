@@ -60,6 +60,13 @@ class PoseTrack:
             ok &= _covered(self.t_attitude, times, self.max_gap, self.max_extrapolation)
         return ok
 
+    def covers(self, t: FloatArray) -> bool:
+        """Return whether `at` answers for all of `t` (n,) (s), in attitude too where there is any."""
+        if not len(self.t) or kernel.first_uncovered(self.t, t, self.max_gap, self.max_extrapolation)[0] >= 0:
+            return False
+        nodes = self.t_attitude
+        return not len(nodes) or bool(kernel.first_uncovered(nodes, t, self.max_gap, self.max_extrapolation)[0] < 0)
+
     def at(self, t: ArrayLike) -> Pose:
         """Return the pose at `t` (n,) or a scalar (s): position (…, 3), velocity (…, 3), enu_from_body (…, 3, 3).
 

@@ -152,7 +152,7 @@ class Tracker:
         track = self.poses.get(sensor.platform) if sensor.platform is not None else None
         if track is not None:
             track = track.until(scan.t_recv)
-            if not track.usable(times, attitude=track.has_attitude).all():
+            if not track.covers(times):
                 return None
         position, velocity, axes = _poses(sensor, track, times)
         t_look = float(times[-1])
