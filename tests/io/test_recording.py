@@ -292,14 +292,18 @@ def test_other_number_types_are_read(write: Write) -> None:
     assert [len(s.row) for s in iter_scans(read_recording(folder))] == [2, 1, 2, 0]
 
 
-def test_geodetic_platforms_agree_with_pymap3d(write: Write) -> None:
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_geodetic_platforms_agree_with_pymap3d(dimensions: int, write: Write) -> None:
     pymap3d = pytest.importorskip("pymap3d")
     lat, lon, height = [63.44, 63.45], [10.40, 10.38], [40.0, 41.0]
 
     def edit(c):
         c["platform"] = {"t_s": [0.0, 10.0], "platform": ["ferry"] * 2, "yaw_deg": [90.0, 90.0]}
         c["platform"] |= {"latitude_deg": lat, "longitude_deg": lon, "height_m": height}
+        c["truth"]["up_m"] = [0.0, 0.0]
 
-    rec = read_recording(write(edit))
-    enu = pymap3d.geodetic2enu(lat, lon, height, 63.4389029083, 10.39908278, 39.923)
+    rec = read_recording(write(edit, TOML.replace("dimensions = 2", f"dimensions = {dimensions}")))
+    enu = np.array(pymap3d.geodetic2enu(lat, lon, height, 63.4389029083, 10.39908278, 39.923))
+    if dimensions == 2:
+        enu[2] = 0.0  # everything lies in the plane of the tracks
     np.testing.assert_allclose(rec.platforms[0].position.T, enu, atol=1e-6)  # metres

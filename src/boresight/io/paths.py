@@ -64,7 +64,10 @@ def _platform_positions(table: Table, site: Site, dimensions: int) -> FloatArray
     height = table.numbers("height_m", required=not flat, default=site.height)
     from boresight.frames.local import enu_from_geodetic  # compiled code: loaded only where it is needed
 
-    return np.stack(enu_from_geodetic(latitude * DEG, longitude * DEG, height, site), axis=1)
+    position = np.stack(enu_from_geodetic(latitude * DEG, longitude * DEG, height, site), axis=1)
+    if flat:  # the plane of the tracks: neither antenna height nor the Earth's curvature is in it
+        position[:, 2] = 0.0
+    return position
 
 
 def truths_of(table: Table, dimensions: int) -> tuple[Truth, ...]:

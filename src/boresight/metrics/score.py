@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 from scipy.stats import chi2
 
 from boresight.errors import UserError
@@ -92,12 +94,14 @@ def _walk(recording: Recording, truth: list[Sampled], tracks: list[Sampled], clo
         live = [t for t in tracks if t.present[k]]
         x = np.array([t.position[k] for t in there]).reshape(-1, d)
         y = np.array([t.position[k] for t in live]).reshape(-1, d)
-        matched = {j for _, j in gospa(x, y, CUT_OFF).pairs}
-        keep = [j for j in range(len(live)) if j in matched or not _is_ignored(y[j], ignored, k)]
-        live, y = [live[j] for j in keep], y[keep]
         g = gospa(x, y, CUT_OFF)
+        matched = {j for _, j in g.pairs}
+        keep = [j for j in range(len(live)) if j in matched or not _is_ignored(y[j], ignored, k)]
+        if len(keep) < len(live):
+            live, y = [live[j] for j in keep], y[keep]
+            g = gospa(x, y, CUT_OFF)
         distances[k] = g.distance, g.localisation, g.missed, g.false
-        ospas[k] = ospa(x, y, CUT_OFF)
+        ospas[k] = ospa(x, y, CUT_OFF, pairs=g.pairs)
         false[k] = len(live) - len(g.pairs)
         _hold(targets, truth, live, k, float(clock[k]))
     return Score(clock, distances, ospas, false, targets, [])
@@ -113,23 +117,23 @@ def _is_ignored(position: FloatArray, ignored: list[tuple[Any, FloatArray, Float
 def _hold(targets: list[TargetScore], truth: list[Sampled], live: list[Sampled], k: int, time: float) -> None:
     """Match stickily: a target keeps its track while that is within the cut-off, else takes the nearest free one."""
     by_id = {t.name: t for t in live}
-
-    def distance(target: Sampled, track: Sampled) -> float:
-        return float(np.linalg.norm(target.position[k] - track.position[k]))
-
     kept: dict[int, Sampled] = {}
     for i, target in enumerate(truth):
-        held = targets[i].track
-        if target.present[k] and held in by_id and distance(target, by_id[held]) <= CUT_OFF:
-            kept[i] = by_id[held]
-    free = [t for t in live if t.name not in {s.name for s in kept.values()}]
+        name = targets[i].track
+        held = by_id.get(name) if name is not None and target.present[k] else None
+        if held is not None and math.dist(target.position[k], held.position[k]) <= CUT_OFF:
+            kept[i] = held
+    used = {s.name for s in kept.values()}
+    free = [t for t in live if t.name not in used]
     asking = [i for i, t in enumerate(truth) if t.present[k] and i not in kept]
-    pairs = sorted((distance(truth[i], t), i, n) for i in asking for n, t in enumerate(free))
-    taken: set[int] = set()
-    for far, i, n in pairs:
-        if far <= CUT_OFF and i not in kept and n not in taken:
-            kept[i] = free[n]
-            taken.add(n)
+    if asking and free:
+        far = cdist([truth[i].position[k] for i in asking], [t.position[k] for t in free])
+        near = np.argwhere(far <= CUT_OFF)
+        taken: set[int] = set()
+        for _, a, n in sorted((far[a, n], a, n) for a, n in near.tolist()):
+            if asking[a] not in kept and n not in taken:
+                kept[asking[a]] = free[n]
+                taken.add(n)
     for i, target in enumerate(truth):
         if target.present[k]:
             _note(targets[i], target, kept.get(i), k, time)

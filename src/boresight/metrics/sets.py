@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
 
 from boresight.types import FloatArray
 
@@ -27,7 +29,7 @@ def gospa(targets: FloatArray, tracks: FloatArray, c: float = 20.0, p: float = 2
     Every missed target and every false track costs c**p / 2 (Rahmathullah, García-Fernández, Svensson 2017, eq. 1).
     """
     pairs = match(targets, tracks, c, p)
-    localisation = float(sum(np.linalg.norm(targets[i] - tracks[j]) ** p for i, j in pairs))
+    localisation = float(sum(math.dist(targets[i], tracks[j]) ** p for i, j in pairs))
     missed = c**p / 2.0 * (len(targets) - len(pairs))
     false = c**p / 2.0 * (len(tracks) - len(pairs))
     return Gospa((localisation + missed + false) ** (1.0 / p), localisation, missed, false, pairs)
@@ -37,16 +39,25 @@ def match(targets: FloatArray, tracks: FloatArray, c: float, p: float = 2.0) -> 
     """Return the pairs (target, track) closer than `c` in the assignment of least total min(distance, c)**p."""
     if len(targets) == 0 or len(tracks) == 0:
         return []
-    distance: NDArray[np.float64] = np.linalg.norm(targets[:, None, :] - tracks[None, :, :], axis=2)
+    distance: NDArray[np.float64] = cdist(targets, tracks)
     rows, columns = linear_sum_assignment(np.minimum(distance, c) ** p)
     return [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if distance[i, j] < c]
 
 
-def ospa(targets: FloatArray, tracks: FloatArray, c: float = 20.0, p: float = 2.0) -> float:
-    """Return the OSPA distance of tracks (m, d) to targets (n, d) in metres (Schuhmacher, Vo, Vo 2008, eq. 3)."""
+def ospa(
+    targets: FloatArray,
+    tracks: FloatArray,
+    c: float = 20.0,
+    p: float = 2.0,
+    pairs: list[tuple[int, int]] | None = None,
+) -> float:
+    """Return the OSPA distance of tracks (m, d) to targets (n, d) in metres (Schuhmacher, Vo, Vo 2008, eq. 3).
+
+    `pairs` are those of `gospa` with the same `c` and `p`, where they are known.
+    """
     n = max(len(targets), len(tracks))
     if n == 0:
         return 0.0
-    pairs = match(targets, tracks, c, p)
-    total = sum(np.linalg.norm(targets[i] - tracks[j]) ** p for i, j in pairs) + c**p * (n - len(pairs))
+    pairs = match(targets, tracks, c, p) if pairs is None else pairs
+    total = sum(math.dist(targets[i], tracks[j]) ** p for i, j in pairs) + c**p * (n - len(pairs))
     return float((total / n) ** (1.0 / p))
