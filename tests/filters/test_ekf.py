@@ -119,6 +119,21 @@ def test_considered_states_widen_but_do_not_move() -> None:
     assert np.mean(np.square(errors)) / state.P[0, 0] == pytest.approx(1.0, abs=0.13)
 
 
+def test_targets_below_the_horizon_and_straight_above() -> None:
+    """A sensor that looks down measures negative elevations; straight above, azimuth says nothing and is left out."""
+    infrared = Infrared(1e-3, 1e-3)
+    below = ekf.init(0.0, np.array([100.0, 50, -400, 0, 0, 0]), np.diag([100.0] * 6))
+    z = infrared.h(np.array([102.0, 50, -400, 0, 0, 0]))
+    assert z[1] < -1.2
+    after, _ = ekf.update(below, infrared, z)
+    assert after.x[0] == pytest.approx(102.0, abs=0.5)
+    above = ekf.init(0.0, np.array([0.0, 0, 500, 0, 0, 0]), np.diag([100.0] * 6))
+    after, info = ekf.update(above, Radar(1.0, 1e-3, 1e-3), np.array([501.0, 0.3, np.pi / 2]))
+    assert len(info.y) == 2
+    assert np.isfinite(after.x).all()
+    assert after.x[2] == pytest.approx(501.0, abs=0.1)
+
+
 def test_mistakes_are_named() -> None:
     state = ekf.init(1.0, np.zeros(6), np.eye(6))
     with pytest.raises(UserError, match="backwards"):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from boresight.errors import UserError
-from boresight.filters import ekf
-from boresight.filters.msc import MscFilter, to_cartesian, to_msc
+from boresight.filters import ekf, stream
+from boresight.filters.msc import MscFilter, to_cartesian, to_msc, to_world
 from boresight.kernels.msc_stream import msc_from_world
 from boresight.models import Infrared, NearlyConstantVelocity, Radar, SensorPose
 
@@ -80,6 +80,32 @@ def test_radar_range_makes_the_hand_over_consistent() -> None:
     # lognormal and not Gaussian, which shows: up to half as much again
     assert 5.0 < np.mean(after) < 7.0
     assert 4.0 < np.mean(before) < 9.0
+
+
+def test_stream_equals_steps_and_its_smoother_the_cartesian_one() -> None:
+    """Well-known range, so that both linearise alike; the target passes south, where azimuth wraps."""
+    rng = np.random.default_rng(4)
+    motion, radar = NearlyConstantVelocity(0.05), Radar(1.0, 1e-3, 1e-3)
+    t = np.arange(1, 81) * 0.5
+    own = np.array([[0.0, 2.0 * s, 0.0, 0.0, 2.0, 0.0] for s in t])
+    sensors = [radar.at(SensorPose(o[:3], o[3:], np.eye(3))) for o in own]
+    truth = [np.array([300.0 - 15 * s, -400.0, 60.0, -15, 0, 0]) for s in t]
+    z = [s.h(x) + rng.normal(size=3) * [1.0, 1e-3, 1e-3] for s, x in zip(sensors, truth)]
+    prior = ekf.init(0.0, np.array([302.0, -401, 61, -14, 0, 0]), np.diag([9.0, 9, 9, 4, 4, 4]))
+    reports, begin = stream.stack(t, sensors, z), to_msc(prior, np.array([0.0, 0, 0, 0, 2.0, 0]))
+    out, state = MSC.run(begin, motion, reports, own), begin
+    for k, now in enumerate(t):
+        state, _ = MSC.update(MSC.predict(state, motion, now, own[k]), sensors[k], z[k])
+        np.testing.assert_allclose(
+            to_world(out.x[k : k + 1], out.P[k : k + 1], own[k : k + 1])[0][0], state.x, rtol=1e-9
+        )
+    smoothed = to_world(*stream.smooth(out), own)
+    cartesian = stream.smooth(stream.run(prior, motion, reports))
+    scale = np.sqrt(np.einsum("kii->ki", cartesian[1]))
+    assert np.abs((smoothed[0] - cartesian[0]) / scale).max() < 0.1
+    np.testing.assert_allclose(np.einsum("kii->ki", smoothed[1]), scale**2, rtol=0.05)
+    with pytest.raises(UserError, match="one position and velocity a report"):
+        MSC.run(begin, motion, reports, own[:3])
 
 
 def test_mistakes_are_named() -> None:

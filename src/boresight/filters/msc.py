@@ -14,10 +14,11 @@ import numpy as np
 
 from boresight.errors import UserError
 from boresight.filters import ekf
+from boresight.filters.stream import Filtered, Reports, require_all
 from boresight.kernels.gaussian import joseph_update, sandwich
 from boresight.kernels.measurement import wrap
 from boresight.kernels.msc import inverse_jacobian, jacobian
-from boresight.kernels.msc_stream import msc_from_world, world_from_msc
+from boresight.kernels.msc_stream import EXACT, msc_from_world, msc_stream, world_from_msc
 from boresight.models import check
 from boresight.models.base import KernelSensor
 from boresight.models.motion.base import KernelMotion
@@ -150,6 +151,38 @@ class MscFilter:
                 break
         assert info is not None
         return MscState(state.t, y, P, state.own), info
+
+    def run(self, state: MscState, motion: KernelMotion, reports: Reports, own: FloatArray) -> Filtered:
+        """Filter a whole stream in one call, the observer at `own` (k, 6); all results are in MSC, azimuth unwrapped.
+
+        `stream.smooth` takes the result; `to_world` turns it to world ENU. Updates are not iterated: for a first sharp
+        range in the middle of a stream take `update`. Raises UserError as `stream.run`.
+        """
+        k, n = len(reports.t), len(state.y)
+        if own.shape != (k, 6):
+            raise UserError(f"the observer needs one position and velocity a report: ({k}, 6), not {own.shape}")
+        shapes = ((k, n), (k, n, n), (k, n), (k, n, n), (k, n, n), (k, 2))
+        out = [np.zeros(shape) for shape in shapes]
+        done = msc_stream(
+            motion.kernel, motion.parameters, reports.observe, state.y, state.Py, state.t, state.own, reports.t,
+            reports.z, reports.context, own, EXACT, *out,
+        )  # fmt: skip
+        require_all(done, reports)
+        y, P, yp, Pp, F, nis = out
+        y[:, AZIMUTH] = np.unwrap(y[:, AZIMUTH])
+        yp[:, AZIMUTH] = y[:, AZIMUTH] + wrapped(yp[:, AZIMUTH] - y[:, AZIMUTH])
+        return Filtered(reports.t, y, P, yp, Pp, F, nis[:, 0].copy(), nis[:, 1].copy())
+
+
+def wrapped(angle: FloatArray) -> FloatArray:
+    """Wrap angles (rad) to [-π, π)."""
+    return np.asarray((angle + math.pi) % (2.0 * math.pi) - math.pi)
+
+
+def to_world(y: FloatArray, P: FloatArray, own: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return world means (k, n) and first-order covariances (k, n, n) of MSC ones about observers `own` (k, 6)."""
+    J = np.array([jacobian(row) for row in y])
+    return np.array([world_from_msc(row, o) for row, o in zip(y, own)]), J @ P @ J.transpose(0, 2, 1)
 
 
 def to_msc(state: GaussianState, own: FloatArray) -> MscState:

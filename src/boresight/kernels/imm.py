@@ -18,6 +18,7 @@ from boresight.kernels.observation import IntArray
 from boresight.kernels.signatures import MATRIX, MOTION, OBSERVATION, STACK, VECTOR
 from boresight.types.sensor import FloatArray
 
+NEGLIGIBLE = 1e-15  # share of a model in the mixture of another
 INTS = types.int64[::1]
 INT_MATRIX = types.int64[:, ::1]
 
@@ -61,32 +62,43 @@ def mix(
     X_out, P_out = np.zeros_like(X), np.zeros_like(P)
     at = np.empty((r, N), np.int64)
     x = np.empty((r, N))
+    share = np.empty(r)
     for j in range(r):
         n = sizes[j]
-        mean = np.zeros(N)
         for i in range(r):
-            same = 1.0 if i == j else 0.0
-            share = transition[i, j] * weights[i] / predicted[j] if predicted[j] > 0.0 else same
+            share[i] = transition[i, j] * weights[i] / predicted[j] if predicted[j] > 0.0 else (1.0 if i == j else 0.0)
+            if share[i] < NEGLIGIBLE:
+                continue
             for a in range(n):
-                at[i, a] = -1
-                for b in range(sizes[i]):
-                    if labels[i, b] == labels[j, a]:
-                        at[i, a] = b
+                at[i, a] = _where(labels, i, sizes[i], labels[j, a], a)
                 x[i, a] = X[i, at[i, a]] if at[i, a] >= 0 else X[j, a]
-                mean[a] += share * x[i, a]
+                X_out[j, a] += share[i] * x[i, a]
         for i in range(r):
-            same = 1.0 if i == j else 0.0
-            share = transition[i, j] * weights[i] / predicted[j] if predicted[j] > 0.0 else same
+            if share[i] < NEGLIGIBLE:
+                continue
             for a in range(n):
-                for b in range(n):
-                    value = (x[i, a] - mean[a]) * (x[i, b] - mean[b])
+                for b in range(a + 1):
+                    value = (x[i, a] - X_out[j, a]) * (x[i, b] - X_out[j, b])
                     if at[i, a] >= 0 and at[i, b] >= 0:
                         value += P[i, at[i, a], at[i, b]]
                     elif at[i, a] < 0 and at[i, b] < 0:
                         value += P[j, a, b]
-                    P_out[j, a, b] += share * value
-        X_out[j] = mean
+                    P_out[j, a, b] += share[i] * value
+        for a in range(n):
+            for b in range(a):
+                P_out[j, b, a] = P_out[j, a, b]
     return predicted, X_out, P_out
+
+
+@njit(cache=True)
+def _where(labels: IntArray, i: int, size: int, label: int, guess: int) -> int:
+    """Return the index of a label in row i, most often `guess`; -1 where it is not."""
+    if guess < size and labels[i, guess] == label:
+        return guess
+    for b in range(size):
+        if labels[i, b] == label:
+            return b
+    return -1
 
 
 @njit(cache=True)
@@ -205,6 +217,8 @@ def imm_stream(
     log_likelihoods = np.empty(r)
     bias, seen = np.zeros_like(scale), np.zeros_like(scale)
     rows = np.empty(7, np.int64)
+    y, R = np.empty(7), np.empty((7, 7))
+    moved, F, Q, H = np.empty(0), np.empty((0, 0)), np.empty((0, 0)), np.empty((7, 0))
     now = t0
     for k in range(t.shape[0]):
         dt = t[k] - now
@@ -215,26 +229,28 @@ def imm_stream(
         now = t[k]
         for j in range(r):
             n = sizes[j]
-            moved, F, Q = np.empty(n), np.empty((n, n)), np.empty((n, n))
-            y, H, R = np.empty(7), np.empty((7, n)), np.empty((7, 7))
+            if moved.shape[0] != n:
+                moved, F, Q, H = np.empty(n), np.empty((n, n)), np.empty((n, n)), np.empty((7, n))
             motion(X[j, :n].copy(), dt, parameters[j], moved, F, Q)
-            covariance = sandwich(F, P[j, :n, :n].copy(), Q)
+            mean, covariance = moved, sandwich(F, P[j, :n, :n].copy(), Q)
             m = observe(moved, z[k], context[k], y, H, R)
             log_likelihoods[j] = 0.0
             if m > 0:
                 rescale(scale[sensor[k]], z[k], m, rows, R)
-                moved, covariance, _, _, log_likelihoods[j] = joseph_update(
+                mean, covariance, _, _, log_likelihoods[j] = joseph_update(
                     moved, covariance, y[:m].copy(), H[:m].copy(), R[:m, :m].copy(), n
                 )
                 if np.isnan(log_likelihoods[j]):
                     return k
-            X[j, :n] = moved
+            X[j, :n] = mean
             P[j, :n, :n] = covariance
         weights = reweigh(weights, log_likelihoods)
         x_out[k], P_out[k] = combine(weights, X, P, n_out)
         weights_out[k] = weights
         if memory > 0.0:
-            y, H, R = np.empty(7), np.empty((7, n_out)), np.empty((7, 7))
+            if H.shape[1] != n_out:
+                moved, F, Q = np.empty(n_out), np.empty((n_out, n_out)), np.empty((n_out, n_out))
+                H = np.empty((7, n_out))
             m = observe(x_out[k], z[k], context[k], y, H, R)
             rescale(np.ones(7), z[k], m, rows, R)
             spread = np.empty(7)

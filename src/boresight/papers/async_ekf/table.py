@@ -132,13 +132,13 @@ def bound(data: Data, runs: int = 20) -> float:
     return float(np.sqrt(np.mean(squares)))
 
 
-def table(name: str, runs: int, seed: int) -> list[dict[str, Any]]:
+def table(name: str, runs: int, seed: int, methods: tuple[str, ...] = tuple(METHODS)) -> list[dict[str, Any]]:
     """Return the rows of scenario `name` (S0, S2) over `runs` runs."""
     data = simulate(SCENARIOS[name], runs, np.random.default_rng(seed))
     limit = bound(data)
     rows = []
-    for method, filter_run in METHODS.items():
-        outcomes = [filter_run(data, run) for run in range(runs)]
+    for method in methods:
+        outcomes = [METHODS[method](data, run) for run in range(runs)]
         error = np.array([o.x[:, :6] for o in outcomes]) - data.truth[:, data.at]
         position = rms(np.linalg.norm(error[..., :3], axis=-1))
         consistency = nees(error, np.array([o.P[:, :6, :6] for o in outcomes]))
