@@ -63,6 +63,34 @@ def test_all_follow_a_target_and_stay_sound(filter_: Any) -> None:
     assert error @ np.linalg.solve(state.P, error) < 22.5  # chi-square, 6 degrees of freedom, 99.9 %
 
 
+def test_20000_reports_stay_positive_definite_in_every_stream() -> None:
+    """A target that circles at 3 km, radar every fifth report and infrared between, through EKF, iterated, UKF, MSC."""
+    rng = np.random.default_rng(6)
+    t = np.cumsum(rng.uniform(0.005, 0.04, 20_000))
+    path = np.stack([3000 * np.cos(0.05 * t), 3000 * np.sin(0.05 * t), np.full(len(t), 500.0)], axis=1)
+    radar, infrared = Radar(10.0, 5e-3, 5e-3), Infrared(5e-4, 5e-4)
+    sensors = [radar if k % 5 == 0 else infrared for k in range(len(t))]
+    sigma = {3: np.array([10.0, 5e-3, 5e-3]), 2: np.array([5e-4, 5e-4])}
+    still = np.zeros(3)
+    z = [s.h(np.r_[p, still]) + sigma[s.dimension] * rng.normal(size=s.dimension) for s, p in zip(sensors, path)]
+    prior = ekf.init(0.0, np.array([3000.0, 0, 500, 0, 150, 0]), np.diag([1e4, 1e4, 1e4, 2500, 2500, 2500]))
+    motion, reports = NearlyConstantVelocity(5.0), stream.stack(t, sensors, z)
+    msc = MscFilter()
+    streams = {
+        "ekf": stream.run(prior, motion, reports),
+        "iekf": stream.run(prior, motion, reports, iterations=5),
+        "ukf": UnscentedKalman(2.0, 2.0, -3.0).run(prior, motion, reports),
+        "msc": msc.run(msc.init(0.0, prior.x, prior.P), motion, reports, np.zeros((len(t), 6))),
+    }
+    for name, out in streams.items():
+        assert np.array_equal(out.P, out.P.transpose(0, 2, 1)), name
+        scale = np.sqrt(np.einsum("kii->ki", out.P))  # MSC mixes 1/m and rad/s: look at correlations
+        assert np.linalg.eigvalsh(out.P / scale[:, :, None] / scale[:, None, :]).min() > 0.0, name
+        smoothed = stream.smooth(out)[1]
+        scale = np.sqrt(np.einsum("kii->ki", smoothed))
+        assert np.linalg.eigvalsh(smoothed / scale[:, :, None] / scale[:, None, :]).min() > 0.0, name
+
+
 @pytest.mark.parametrize("filter_", FILTERS)
 def test_accelerations_ride_along(filter_: Any) -> None:
     motion = NearlyConstantAcceleration(0.01)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 from cyclopts import App
 
 app = App(name="paper", help="Print a paper's table: as printed, corrected, and ours.", help_format="plaintext")
@@ -16,3 +18,12 @@ PAPERS: dict[str, tuple[str, str]] = {
 
 for _name, (_target, _help) in PAPERS.items():
     app.command(_target, name=_name, help=_help)
+
+
+def say(what: str) -> None:
+    """Say on standard error what is being done, where that is a terminal."""
+    if sys.stderr.isatty():
+        print(f"boresight: {what} …", file=sys.stderr, flush=True)
+
+
+LOADING = "loading kernels (the first run compiles them, about half a minute)"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from boresight.cli.output import print_json, print_table
+from boresight.cli.paper import LOADING, say
 from boresight.errors import UserError, did_you_mean
 
 COLUMNS = {
@@ -31,6 +32,7 @@ def async_ekf(*, scenario: str = "all", runs: int = 500, seed: int = 1, json: bo
     json
         Print one JSON object instead of a table.
     """
+    say(LOADING)
     from boresight.papers.async_ekf import doppler
     from boresight.papers.async_ekf.scenario import SCENARIOS
     from boresight.papers.async_ekf.table import table
@@ -43,9 +45,10 @@ def async_ekf(*, scenario: str = "all", runs: int = 500, seed: int = 1, json: bo
         )
     if runs < 1:
         raise UserError(f"--runs must be at least 1, not {runs}")
-    rows = [
-        row for name in names for row in (doppler.table(runs, seed) if name == "doppler" else table(name, runs, seed))
-    ]
+    rows = []
+    for name in names:
+        say(f"scenario {name}")
+        rows += doppler.table(runs, seed) if name == "doppler" else table(name, runs, seed)
     if json:
         print_json("paper async_ekf", {"scenario": scenario, "runs": runs, "seed": seed}, rows)
         return

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from boresight.cli.output import print_json, print_table
+from boresight.cli.paper import LOADING, say
 from boresight.errors import UserError, did_you_mean
 
 COLUMNS = {  # the ratio in elevation is left to --json: 80 columns
@@ -62,6 +63,7 @@ def shao2012(
     json
         Print one JSON object instead of a table.
     """
+    say(LOADING)
     from boresight.papers.shao2012.cases import CASES
     from boresight.papers.shao2012.scenario import SETS
 
@@ -87,8 +89,9 @@ def _rows(name: str, runs: int, seed: int) -> list[dict[str, Any]]:
     from boresight.papers.shao2012.table import table
 
     if name in CASES:
+        say(f"case {name}")
         return CASES[name](runs, np.random.default_rng(seed))
-    return table(name, runs, seed)
+    return table(name, runs, seed, lambda method: say(f"set {name}, {method}"))
 
 
 def _plot(path: Path, name: str, runs: int, seed: int) -> None:
