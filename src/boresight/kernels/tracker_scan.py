@@ -185,6 +185,11 @@ def gate_all(
     for k in range(m):
         c = components(look.z[k], s.d, mask)
         log_density[k] = math.log(max(clutter_density(tr, s, sensor, look.z[k], mask, c), 1e-300))
+    fixes = np.zeros((m, 3))
+    spread, dt_high = fix_all(s, sensor, look, usable, fixes)
+    near_only = math.isfinite(spread)
+    order = np.argsort(fixes[:, 0]) if near_only else np.arange(m)
+    east = fixes[order, 0]
     used = 0
     for i in range(n_tracks):
         start[i] = used
@@ -195,8 +200,15 @@ def gate_all(
         log_hit = math.log(p_there * p_d[i])
         log_miss = math.log(1.0 - p_there * p_d[i])
         last_pose = -1
-        for k in range(m):
-            if not usable[k]:
+        first, last = 0, m
+        reach = np.inf
+        if near_only:
+            reach = reach_of(tr, i, s, spread, dt_high)
+            first = np.searchsorted(east, tr.x[i, 0] - reach)
+            last = np.searchsorted(east, tr.x[i, 0] + reach, side="right")
+        for at in range(first, last):
+            k = order[at]
+            if not usable[k] or (near_only and abs(fixes[k, 1] - tr.x[i, 1]) > reach):
                 continue
             if last_pose < 0 or look.dt[k] != look.dt[last_pose]:
                 linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, zhat, H, h6)
@@ -228,6 +240,46 @@ def gate_all(
             used += 1
     start[n_tracks] = used
     return start, column[:used], cost[:used], distance[:used], loglik[:used]
+
+
+@njit(cache=True)
+def fix_all(
+    s: Settings, sensor: SensorTable, look: Look, usable: NDArray[np.bool_], fixes: FloatArray
+) -> tuple[float, float]:
+    """Fill the world positions of all detections; return their largest variance (m², bias included) and largest |dt|.
+
+    The variance is infinite where a detection gives no position: then nearness cannot be told beforehand.
+    """
+    spread = 0.0
+    dt_high = 0.0
+    R = np.empty((3, 3))
+    J = np.zeros((3, 3))
+    mask = np.empty(3, np.int64)
+    for k in range(len(look.dt)):
+        if not usable[k]:
+            continue
+        if not sensor.ranging or not world_fix(look, k, s, sensor, fixes[k], R, J, mask):
+            return np.inf, 0.0
+        total = R[0, 0] + R[1, 1] + (R[2, 2] if s.d == 3 else 0.0)
+        for e in range(3):
+            b = sensor.bias[mask[e]]
+            if b >= 0:
+                total += (J[0, e] ** 2 + J[1, e] ** 2 + J[2, e] ** 2) * s.bias_sigma[b - 2 * s.d] ** 2
+        spread = max(spread, total)
+        dt_high = max(dt_high, abs(look.dt[k]))
+    return spread, dt_high
+
+
+@njit(cache=True)
+def reach_of(tr: Tracks, i: int, s: Settings, spread: float, dt: float) -> float:
+    """Distance (m) beyond which no detection can be in the gate of track `i`: NIS >= d² / trace(S), twice over."""
+    total = spread
+    speed = 0.0
+    for a in range(s.d):
+        v = s.d + a
+        total += tr.P[i, a, a] + 2.0 * dt * abs(tr.P[i, a, v]) + dt * dt * tr.P[i, v, v]
+        speed += tr.x[i, v] ** 2
+    return 2.0 * math.sqrt(s.gates[7] * total) + dt * math.sqrt(speed)
 
 
 @njit(cache=True)
@@ -509,7 +561,8 @@ def begin(
                 P[a, b] = acc + shared + ((dt * s.speed_sigma) ** 2 if a == b else 0.0)
                 tr.anchor_P[i, a, b] = acc
         density = tr.clutter[sensor.number, AZIMUTH_BINS]
-        born = s.birth_rate / (s.birth_rate + density)
+        # a first look full of targets must not pass for clutter: their number is not known yet
+        born = max(s.birth_rate / (s.birth_rate + density), 5.0 * s.delete_below)
         w = tr.weight[i]
         w[VISIBLE] = born * (1.0 - s.static_share)
         w[HIDDEN] = 0.0
@@ -561,42 +614,28 @@ def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look) -> None:
 
 @njit(cache=True)
 def end_and_merge(tr: Tracks, s: Settings) -> None:
-    """Drop tracks that are probably nothing, and the younger of two that have become one."""
-    keep = np.ones(tr.live[0], np.bool_)
-    d = s.d
-    for i in range(tr.live[0]):
+    """Drop tracks that are probably nothing, and the weaker of two that have become one."""
+    n_tracks = tr.live[0]
+    keep = np.ones(n_tracks, np.bool_)
+    for i in range(n_tracks):
         w = tr.weight[i]
         target = w[VISIBLE] + w[HIDDEN]
         if target + w[STATIC] < s.delete_below:
             keep[i] = False
-            continue
-        if target < s.hide_below:
+        elif target < s.hide_below:
             tr.life[i, 2] = 0.0
-    for i in range(tr.live[0]):
-        if not keep[i] or tr.life[i, 3] < 2.0:
-            continue
-        for j in range(tr.live[0]):
-            if i == j or not keep[j]:
-                continue
-            gap = 0.0
-            for a in range(d):
-                gap += (tr.x[i, a] - tr.x[j, a]) ** 2
-            if gap > s.merge_distance**2 or tr.life[j, 3] < 2.0:
-                continue
-            speed = 0.0
-            spread = 0.0
-            for a in range(d):
-                speed += (tr.x[i, d + a] - tr.x[j, d + a]) ** 2
-                spread += tr.P[i, d + a, d + a] + tr.P[j, d + a, d + a]
-            if speed > 4.0 * spread:
-                continue
-            stronger = tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN] + tr.life[i, 2]
-            if stronger > tr.weight[j, VISIBLE] + tr.weight[j, HIDDEN] + tr.life[j, 2] or (
-                tr.life[i, 0] < tr.life[j, 0] and stronger >= tr.life[j, 2]
-            ):
-                keep[j] = False
+    order = np.argsort(tr.x[:n_tracks, 0])  # neighbours lie next to each other in the east
+    for a in range(n_tracks):
+        i = order[a]
+        for b in range(a + 1, n_tracks):
+            j = order[b]
+            if tr.x[j, 0] - tr.x[i, 0] > s.merge_distance or not keep[i]:
+                break
+            if keep[j] and are_one(tr, i, j, s):
+                weaker = j if rank(tr, i) >= rank(tr, j) else i
+                keep[weaker] = False
     at = 0
-    for i in range(tr.live[0]):
+    for i in range(n_tracks):
         if keep[i]:
             if at != i:
                 tr.birth[at] = tr.birth[i]
@@ -608,3 +647,25 @@ def end_and_merge(tr: Tracks, s: Settings) -> None:
                 tr.life[at] = tr.life[i]
             at += 1
     tr.live[0] = at
+
+
+@njit(cache=True)
+def are_one(tr: Tracks, i: int, j: int, s: Settings) -> bool:
+    """Whether two tracks, each hit more than once, are at one place and move alike."""
+    if tr.life[i, 3] < 2.0 or tr.life[j, 3] < 2.0:
+        return False
+    gap = 0.0
+    speed = 0.0
+    spread = 0.0
+    for a in range(s.d):
+        v = s.d + a
+        gap += (tr.x[i, a] - tr.x[j, a]) ** 2
+        speed += (tr.x[i, v] - tr.x[j, v]) ** 2
+        spread += tr.P[i, v, v] + tr.P[j, v, v]
+    return bool(gap <= s.merge_distance**2 and speed <= 4.0 * spread)
+
+
+@njit(cache=True)
+def rank(tr: Tracks, i: int) -> float:
+    """Which of two tracks that are one should stay: a shown one, then the more probable, then the older."""
+    return float(tr.life[i, 2] + tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN] - 1e-9 * tr.birth[i])
