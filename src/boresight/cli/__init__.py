@@ -31,6 +31,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "info": ("boresight.cli.info:info", "Say what is in a recording."),
     "export": ("boresight.cli.export:export", "Write tracks as CSV, GeoJSON or KML."),
     "convert": ("boresight.cli.convert:convert", "Turn pixels, az/el, ENU, NED, ECEF and geodetic into each other."),
+    "point": ("boresight.cli.point:point", "Point an antenna or beam at what the sources report."),
     "paper": ("boresight.cli.paper:app", "Print a paper's table: as printed, corrected, and ours."),
 }
 

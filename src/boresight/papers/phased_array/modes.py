@@ -32,6 +32,7 @@ GUIDES = (
 FILTER = GuideFilter(GUIDES)
 SPAN = 20.0  # s of good reports that the quadratic of `repaired` sees
 MEMORY = 40  # nodes over which sources are compared with each other
+LEFT_OUT = 6.0  # σ beyond which a report leaves the fit again
 LOST = 6.0  # s without a report after which a source has no say
 
 
@@ -127,8 +128,14 @@ class _Line:
         t, y = self.t[first:], self.y[first:]
         if len(t) < 4 or at - t[-1] > LOST:
             return None
-        weights = polynomial_weights(t, [at], 2)[0]
-        return weights @ np.array(y), float(np.sqrt(weights @ weights))
+        times, values = np.array(t), np.array(y)
+        while True:  # what came in before the screen had a history to judge by
+            rows = polynomial_weights(times, [*times, at], 2)
+            off = np.abs(values - rows[:-1] @ values).max(axis=1)
+            worst = int(np.argmax(off))
+            if off[worst] <= LEFT_OUT * self.sigma[-1] or len(times) <= 5:
+                return rows[-1] @ values, float(np.sqrt(rows[-1] @ rows[-1]))
+            times, values = np.delete(times, worst), np.delete(values, worst, axis=0)
 
 
 def _still(s: Source, which: int) -> tuple[FloatArray, FloatArray]:

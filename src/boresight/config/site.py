@@ -1,0 +1,181 @@
+"""SITE.toml of `boresight point`: units in the keys, unknown keys named, to `pointing.Pointer` and `Mount`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from boresight.errors import UserError, did_you_mean
+from boresight.frames.array_face import Pole
+from boresight.io.toml import TableModel, convert, read_toml
+from boresight.pointing.guide import GuideFilter, GuideSource
+from boresight.pointing.mount import Mount
+from boresight.pointing.pointer import Choice, Pointer
+from boresight.types import Component, Recording, Sensor, Site
+
+DEG = math.pi / 180.0
+
+
+class SiteTable(TableModel, frozen=True):
+    """`[site]`: where the antenna stands."""
+
+    latitude_deg: float
+    longitude_deg: float
+    height_m: float = 0.0
+
+
+class BeamTable(TableModel, frozen=True):
+    """`[beam]`: its full width, and the time from now until it is there: computation + link + mechanics."""
+
+    width_deg: float = 1.0
+    computation_s: float = 0.01
+    link_s: float = 0.04
+    mechanics_s: float = 0.45
+    rate_hz: float = 10.0
+
+
+class FaceTable(TableModel, frozen=True):
+    """`[face]`: how an array's face is turned, and where the pole of its angles lies."""
+
+    azimuth_deg: float = 0.0
+    elevation_deg: float = 90.0
+    skew_deg: float = 0.0
+    pole: Literal["in_face", "on_normal"] = "on_normal"
+
+
+class MountTable(TableModel, frozen=True):
+    """`[mount]`: mechanical stops and rates; `horizon_deg` is what stands in the way, corner by corner."""
+
+    azimuth_deg: tuple[float, float] = (-270.0, 270.0)
+    elevation_deg: tuple[float, float] = (0.0, 90.0)
+    azimuth_rate_deg_s: float = 10.0
+    elevation_rate_deg_s: float = 10.0
+    horizon_deg: tuple[tuple[float, float], ...] = ()
+
+
+class DynamicsTable(TableModel, frozen=True):
+    """`[dynamics]`: kind = "orbit" (q in m²/s³) or "acceleration" (white jerk, q in m²/s⁵)."""
+
+    kind: Literal["orbit", "acceleration"] = "acceleration"
+    q: float | None = None
+    gate: float = 30.0
+
+
+class SourceTable(TableModel, frozen=True):
+    """`[[source]]`: a guide source or own tracking; live ones say where they are heard."""
+
+    id: str
+    own: bool = False
+    sigma_angle_deg: float = 0.0
+    sigma_range_m: float = 0.0
+    sigma_position_m: float = 0.0
+    sigma_bias_m: float = 0.0
+    offset_enu_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class InputTable(TableModel, frozen=True):
+    """`[input]`: where JSON lines come from; any of them may be left out."""
+
+    udp: str | None = None
+    tcp: str | None = None
+    serial: str | None = None
+    baud: int = 9600
+
+
+class OutputTable(TableModel, frozen=True):
+    """`[output]`: where commands go."""
+
+    udp: str | None = None
+    rotctld: str | None = None
+    dead_band_deg: float = 0.1
+    command_rate_hz: float = 2.0
+
+
+class SiteFile(TableModel, frozen=True):
+    """The whole file."""
+
+    site: SiteTable
+    beam: BeamTable = BeamTable()
+    face: FaceTable = FaceTable()
+    mount: MountTable = MountTable()
+    dynamics: DynamicsTable = DynamicsTable()
+    choice: Literal["auto", "guide", "own"] = "auto"
+    stale_s: float = 3.0
+    source: tuple[SourceTable, ...] = ()
+    input: InputTable = InputTable()
+    output: OutputTable = OutputTable()
+
+
+class Station(NamedTuple):
+    """A site file, built."""
+
+    file: SiteFile
+    site: Site
+    mount: Mount
+
+
+def read_site(path: Path) -> Station:
+    """Read SITE.toml; raises UserError that names file and key."""
+    file = convert(read_toml(path), SiteFile, str(path))
+    s, m = file.site, file.mount
+    if not abs(s.latitude_deg) <= 90.0:
+        raise UserError(f"{path}: site.latitude_deg = {s.latitude_deg:g} must lie between -90 and 90")
+    if not (file.beam.rate_hz > 0 and file.beam.width_deg > 0 and file.output.command_rate_hz > 0):
+        raise UserError(f"{path}: beam.rate_hz, beam.width_deg and output.command_rate_hz must be above zero")
+    mount = Mount(
+        (m.azimuth_deg[0] * DEG, m.azimuth_deg[1] * DEG), (m.elevation_deg[0] * DEG, m.elevation_deg[1] * DEG),
+        m.azimuth_rate_deg_s * DEG, m.elevation_rate_deg_s * DEG, tuple((a * DEG, e * DEG) for a, e in m.horizon_deg),
+    )  # fmt: skip
+    return Station(file, Site(s.latitude_deg * DEG, s.longitude_deg * DEG, s.height_m), mount)
+
+
+def pointer_for(station: Station, recording: Recording | None = None) -> Pointer:
+    """Return the chain: its sources are those of the file, or a recording's sensors as they declare themselves.
+
+    A `[[source]]` of a sensor's id replaces what the sensor declares. Raises UserError for a source that the recording
+    does not have, and for no source at all.
+    """
+    file = station.file
+    named = {s.id: s for s in file.source}
+    if recording is None:
+        sources = [_source(s) for s in file.source]
+    else:
+        known = [s.id for s in recording.sensors]
+        for name in named:
+            if name not in known:
+                raise UserError(f"source '{name}' is not in the recording{did_you_mean(name, known)}")
+        sources = [_source(named[s.id]) if s.id in named else _declared(s) for s in recording.sensors]
+    if not sources:
+        raise UserError("the site file has no [[source]]: say who reports")
+    orbit = file.dynamics.kind == "orbit"
+    q = file.dynamics.q if file.dynamics.q is not None else (1e-3 if orbit else 1.0)
+    spread = (1e5, 8e3, 50.0) if orbit else (1e3, 300.0, 20.0)
+    beam, face = file.beam, file.face
+    return Pointer(
+        GuideFilter(tuple(sources), orbit, q, file.dynamics.gate, spread=spread),
+        station.site,
+        tuple(named[s.id].own if s.id in named else False for s in sources),
+        (face.azimuth_deg * DEG, face.elevation_deg * DEG, face.skew_deg * DEG),
+        Pole(face.pole),
+        beam.width_deg * DEG,
+        beam.computation_s + beam.link_s + beam.mechanics_s,
+        Choice(file.choice),
+        file.stale_s,
+    )
+
+
+def _source(s: SourceTable) -> GuideSource:
+    return GuideSource(s.id, s.sigma_angle_deg * DEG, s.sigma_range_m, s.sigma_position_m, s.sigma_bias_m)
+
+
+def _declared(s: Sensor) -> GuideSource:
+    """A sensor as a source: of directions if it measures angles (its larger one), else of positions."""
+    angles = [float(v) for v in s.sigma[[Component.AZIMUTH, Component.ELEVATION]] if v > 0]
+    if angles:
+        r = float(s.sigma[Component.RANGE])
+        return GuideSource(s.id, sigma_angle=max(angles), sigma_range=r if r > 0 else 0.0)
+    position = [float(v) for v in s.sigma[[Component.EAST, Component.NORTH, Component.UP]] if v > 0]
+    if not position:
+        raise UserError(f"sensor '{s.id}' measures neither direction nor position: it cannot guide a beam")
+    return GuideSource(s.id, sigma_position=max(position))

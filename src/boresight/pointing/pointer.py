@@ -1,0 +1,162 @@
+"""From reports to commands: the guide filter, the aim ahead of time, and what to do when sources fall silent."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from boresight.errors import UserError
+from boresight.frames.array_face import Pole, enu_from_face
+from boresight.frames.azel import azel_from_enu
+from boresight.frames.local import ecef_from_enu, ecef_from_enu_rotation
+from boresight.frames.tangent import direction_from_tangent
+from boresight.pointing.beam import Aim, aim_at
+from boresight.pointing.guide import EYE, NONE, GuideFilter, GuideState
+from boresight.types import Site
+from boresight.types.sensor import FloatArray
+
+
+class Mode(StrEnum):
+    """What the beam follows."""
+
+    FUSED = "fused"  # guide sources (and own tracking where it is there)
+    OWN = "own"  # own tracking alone: no guide is fresh
+    COAST = "coast"  # nobody is fresh: the prediction goes on, its covariance grows
+    SEARCH = "search"  # the covariance has outgrown the beam: a spiral about the prediction
+
+
+class Choice(StrEnum):
+    """Which sources may steer."""
+
+    AUTO = "auto"
+    GUIDE = "guide"  # guide sources only
+    OWN = "own"  # own tracking only
+
+
+class Pointing(NamedTuple):
+    """One command."""
+
+    t: float  # s
+    t_aim: float  # s, when the beam will be there
+    aim: Aim
+    mode: Mode
+
+
+@dataclass(frozen=True, slots=True)
+class Pointer:
+    """Configuration of the chain.
+
+    `own` (s,) says which sources are own tracking. A source is fresh until `stale` (s) after its last report; going
+    back from own tracking or coasting to the guides takes `settle` (s) of fresh reports: hysteresis. `search_below`
+    is the probability in the beam below which the beam begins to search while nobody is fresh.
+    """
+
+    guide: GuideFilter
+    site: Site
+    own: tuple[bool, ...]
+    face: tuple[float, float, float] = (0.0, 0.5 * math.pi, 0.0)  # boresight azimuth, elevation, skew (rad)
+    pole: Pole = Pole.ON_NORMAL
+    beam_width: float = math.radians(1.0)  # full
+    lead: float = 1.0  # s: computation, link and mechanics
+    choice: Choice = Choice.AUTO
+    stale: float = 3.0
+    settle: float = 2.0
+    search_below: float = 0.5
+
+    def __post_init__(self) -> None:
+        if len(self.own) != len(self.guide.sources):
+            raise UserError("pointer: say for each source whether it is own tracking")
+        if not (self.beam_width > 0 and self.lead >= 0 and self.stale > 0):
+            raise UserError("pointer: beam width and stale time must be above zero, the lead not negative")
+
+    def init(self) -> PointerState:
+        """Return the state before the first report."""
+        n = len(self.own)
+        return PointerState(self.guide.init(), np.full(n, -math.inf), np.full(n, -math.inf), Mode.COAST, -math.inf, 0)
+
+    def allowed(self, source: int) -> bool:
+        """Return whether a source may steer by the choice made by hand."""
+        return self.choice == Choice.AUTO or (self.choice == Choice.OWN) == self.own[source]
+
+    def take(
+        self,
+        state: PointerState,
+        source: int,
+        t: float,
+        z: FloatArray,
+        origin: FloatArray = NONE,
+        axes: FloatArray = EYE,
+    ) -> int:
+        """Take in one report in the state's own arrays; returns its fate (`kernels.guide_run`), -1 if not allowed."""
+        if not self.allowed(source):
+            return -1
+        fate = self.guide.step(state.guide, source, t, z, origin, axes)
+        if fate == 0:
+            if t - state.last[source] > self.stale:
+                state.since[source] = t
+            state.last[source] = max(state.last[source], t)
+        return fate
+
+    def tick(self, state: PointerState, t: float) -> tuple[PointerState, Pointing | None]:
+        """Return the command at time `t` (s); None before the first report with a range."""
+        predicted = self.guide.predict(state.guide, t + self.lead)
+        if predicted is None:
+            return state, None
+        R = ecef_from_enu_rotation(self.site)
+        here = np.array(ecef_from_enu(0.0, 0.0, 0.0, self.site))
+        args = (enu_from_face(*self.face), self.pole, 0.5 * self.beam_width)
+        to_target, velocity = (predicted.position - here) @ R, predicted.velocity @ R
+        covariance = R.T @ predicted.covariance @ R
+        aim = aim_at(to_target, velocity, covariance, *args)
+        mode = self._mode(state, t, aim)
+        if mode == Mode.SEARCH:
+            begun = state.search_begun if state.mode == Mode.SEARCH else t
+            n = state.searched + 1 if state.mode == Mode.SEARCH else 0
+            d = direction_from_tangent(aim.direction, _spiral(n, self.beam_width, 3.0 * aim.sigma))
+            azimuth, elevation, _ = azel_from_enu(*(float(v) for v in d))
+            aimed = aim_at(d * np.linalg.norm(to_target), velocity, covariance, *args)
+            aim = aimed._replace(azimuth=azimuth, elevation=elevation, p_in_beam=aim.p_in_beam)
+            state = state._replace(mode=mode, search_begun=begun, searched=n)
+        else:
+            state = state._replace(mode=mode, searched=0)
+        return state, Pointing(t, t + self.lead, aim, mode)
+
+    def ages(self, state: PointerState, t: float) -> FloatArray:
+        """Return how old each source's last good report is (s), infinite before the first."""
+        return t - state.last
+
+    def _mode(self, state: PointerState, t: float, aim: Aim) -> Mode:
+        fresh = t - state.last <= self.stale
+        own = np.array(self.own)
+        guides = fresh & ~own
+        if guides.any():
+            settled = bool((guides & (t - state.since >= self.settle)).any())
+            if settled or state.mode == Mode.FUSED or not (fresh & own).any():
+                return Mode.FUSED
+        if (fresh & own).any():
+            return Mode.OWN
+        return Mode.SEARCH if aim.p_in_beam < self.search_below else Mode.COAST
+
+
+class PointerState(NamedTuple):
+    """All that changes. `last` and `since` (s,): last good report of each source, and since when it has been fresh."""
+
+    guide: GuideState
+    last: FloatArray
+    since: FloatArray
+    mode: Mode
+    search_begun: float
+    searched: int
+
+
+def _spiral(n: int, width: float, reach: float) -> FloatArray:
+    """Return the n-th offset (2,) (rad) of a spiral with arms 0.8 beam widths apart; it begins anew at `reach`."""
+    pitch = 0.8 * width
+    turns = max(math.pi * (max(reach, pitch) / pitch) ** 2, 1.0)  # points until the arm is out there
+    angle = math.sqrt(4.0 * math.pi * (n % math.ceil(turns)))
+    radius = pitch * angle / (2.0 * math.pi)
+    return np.array([radius * math.cos(angle), radius * math.sin(angle)])

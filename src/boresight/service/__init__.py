@@ -1,0 +1,1 @@
+"""Live: sockets, clocks and devices around the pure parts."""

@@ -1,0 +1,139 @@
+"""The live loop: what arrives goes in at once, a command goes out at every tick."""
+
+from __future__ import annotations
+
+import math
+import socket
+import time
+from collections.abc import Callable
+from typing import Any, TextIO
+
+import msgspec
+
+from boresight.config.site import Station
+from boresight.errors import UserError
+from boresight.pointing.pointer import Pointer, PointerState, Pointing
+from boresight.service.feed import PER_TICK, Feed, origins
+from boresight.service.rotctld import Rotator
+from boresight.service.sockets import Input, Serial, Tcp, Udp, address
+
+POLL = 0.002  # s between looks at the inputs
+
+
+def run_live(
+    station: Station,
+    pointer: Pointer,
+    duration: float | None,
+    status: TextIO | None,
+    clock: Callable[[], float] = time.time,
+    stop: Callable[[], bool] = lambda: False,
+) -> dict[str, Any]:
+    """Point until `duration` (s) has passed, `stop` says so or the user interrupts; returns the counts.
+
+    Raises UserError if the site file names no input, or one that cannot be opened.
+    """
+    file = station.file
+    inputs = _inputs(station)
+    offsets = {s.id: s.offset_enu_m for s in file.source}
+    feed = Feed(pointer, origins(station.site, offsets))
+    out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM) if file.output.udp else None
+    goal = address(file.output.udp, "output.udp") if file.output.udp else ("", 0)
+    rotator = None
+    if file.output.rotctld:
+        band, period = math.radians(file.output.dead_band_deg), 1.0 / file.output.command_rate_hz
+        rotator = Rotator(file.output.rotctld, station.mount, band, period)
+    state, begun = _warm(pointer), clock()
+    tick, ticks, latency, busy = begun, 0, 0.0, time.process_time()
+    arrived = math.nan
+    try:
+        while not stop() and (duration is None or clock() - begun < duration):
+            now = clock()
+            for source in inputs:
+                for data in source.read():
+                    for report in feed.parse(data, now):
+                        pointer.take(state, *report)
+                        arrived = now
+            if now < tick:
+                time.sleep(min(POLL, tick - now))
+                continue
+            state, pointing = pointer.tick(state, now)
+            if pointing is not None:
+                if out is not None:
+                    out.sendto(encode(pointing), goal)
+                if rotator is not None:
+                    rotator.follow(pointing.aim.azimuth, pointing.aim.elevation, now)
+                if not math.isnan(arrived):
+                    latency = max(latency, clock() - arrived) if ticks else 0.0
+                ticks += 1
+                arrived = math.nan
+            if status is not None and pointing is not None:
+                status.write("\r" + status_line(pointer, state, pointing, rotator))
+                status.flush()
+            tick = max(tick + 1.0 / file.beam.rate_hz, now)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        for source in inputs:
+            source.close()
+        if out is not None:
+            out.close()
+        if rotator is not None:
+            rotator.close()
+        if status is not None:
+            status.write("\n")
+    spent, wall = time.process_time() - busy, max(clock() - begun, 1e-9)
+    found: dict[str, Any] = {"ticks": ticks, "latency_max_s": latency, "core_share": spent / wall, **feed.counts}
+    return found | ({f"rotator_{k}": v for k, v in rotator.counts.items()} if rotator else {})
+
+
+def encode(p: Pointing) -> bytes:
+    """Return a command as one JSON line."""
+    a = p.aim
+    degrees = {
+        "az_deg": a.azimuth, "el_deg": a.elevation, "face_az_deg": a.face_azimuth, "face_el_deg": a.face_elevation,
+        "az_rate_deg_s": a.azimuth_rate, "el_rate_deg_s": a.elevation_rate, "sigma_deg": a.sigma,
+    }  # fmt: skip
+    row = {"t_s": p.t, "t_aim_s": p.t_aim, **{k: math.degrees(v) for k, v in degrees.items()}}
+    return msgspec.json.encode({**row, "p_in_beam": a.p_in_beam, "mode": str(p.mode)}) + b"\n"
+
+
+def status_line(pointer: Pointer, state: PointerState, p: Pointing, rotator: Rotator | None) -> str:
+    """Return the line that says how it goes: mode, aim, error, each source's age and learned sigma factor."""
+    ages = pointer.ages(state, p.t)
+    sources = "  ".join(
+        f"{s.id} {'–' if math.isinf(age) else f'{age:.1f}s'} ×{math.sqrt(scale):.2f}"
+        for s, age, scale in zip(pointer.guide.sources, ages, state.guide.scale, strict=True)
+    )
+    best = int(state.guide.clock[3])
+    biased = f"  {pointer.guide.sources[best - 1].id} is biased" if best else ""
+    where = "" if rotator is None else ("  rotator away" if rotator.position is None else "  rotator on")
+    aim = f"az {math.degrees(p.aim.azimuth):8.3f} el {math.degrees(p.aim.elevation):7.3f}"
+    error = f"σ {math.degrees(p.aim.sigma):.3f}° P {p.aim.p_in_beam:.2f}"
+    return f"{p.mode:6s} {aim} {error}  {sources}{biased}{where}   "
+
+
+def _inputs(station: Station) -> list[Input]:
+    wanted = station.file.input
+    inputs: list[Input] = []
+    if wanted.udp:
+        inputs.append(Udp(wanted.udp, PER_TICK))
+    if wanted.tcp:
+        inputs.append(Tcp(wanted.tcp, PER_TICK))
+    if wanted.serial:
+        inputs.append(Serial(wanted.serial, wanted.baud, PER_TICK))
+    if not inputs:
+        raise UserError("the site file has no [input]: give udp, tcp or serial, or use --replay")
+    return inputs
+
+
+def _warm(pointer: Pointer) -> PointerState:
+    """Compile the kernels before the first report, on a filter that is thrown away."""
+    import numpy as np
+
+    scratch = pointer.init()
+    here = np.array([7e6, 0.0, 0.0])
+    for source, s in enumerate(pointer.guide.sources):
+        z = np.array([0.1, 0.2, 1e5]) if s.kind == 0 else here
+        pointer.take(scratch, source, 0.0, z, here, np.eye(3))
+        pointer.tick(scratch, 0.5)
+    return pointer.init()

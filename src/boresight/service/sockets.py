@@ -1,0 +1,146 @@
+"""Where lines come from: UDP datagrams, TCP connections, a serial port; nothing here waits."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import socket
+from typing import Any, Protocol
+
+from boresight.errors import UserError
+
+BUFFER = 1 << 16  # bytes kept of an unfinished line, then it is dropped
+CONNECTIONS = 32
+
+
+class Input(Protocol):
+    """Something that has bytes, or not."""
+
+    def read(self) -> list[bytes]:
+        """Return whole datagrams or lines that have arrived, without waiting."""
+        ...
+
+    def close(self) -> None:
+        """Give it back."""
+        ...
+
+
+def address(text: str, key: str) -> tuple[str, int]:
+    """Return (host, port) of "host:port"; raises UserError."""
+    host, _, port = text.rpartition(":")
+    if not port.isdigit() or not 0 <= int(port) < 65536:
+        raise UserError(f"{key} = '{text}': give host:port")
+    return host or "127.0.0.1", int(port)
+
+
+class Udp:
+    """Datagrams on a port."""
+
+    def __init__(self, text: str, most: int) -> None:
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self.socket.bind(address(text, "input.udp"))
+        except OSError as error:
+            self.socket.close()
+            raise UserError(f"input.udp = '{text}': {error.strerror}") from None
+        self.socket.setblocking(False)
+        self.most = most
+
+    def read(self) -> list[bytes]:
+        """Return at most `most` datagrams: a flood waits in the system's buffer, which drops."""
+        out: list[bytes] = []
+        with contextlib.suppress(BlockingIOError, ConnectionError):
+            while len(out) < self.most:
+                out.append(self.socket.recv(BUFFER))
+        return out
+
+    def close(self) -> None:
+        """Close the socket."""
+        self.socket.close()
+
+
+class Tcp:
+    """Lines from whoever connects."""
+
+    def __init__(self, text: str, most: int) -> None:
+        self.server = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self.server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            self.server.bind(address(text, "input.tcp"))
+        except OSError as error:
+            self.server.close()
+            raise UserError(f"input.tcp = '{text}': {error.strerror}") from None
+        self.server.listen(CONNECTIONS)
+        self.server.setblocking(False)
+        self.peers: dict[socket.socket, bytes] = {}
+        self.most = most
+
+    def read(self) -> list[bytes]:
+        """Return whole lines; an unfinished one longer than the buffer is dropped with its beginning."""
+        with contextlib.suppress(BlockingIOError):
+            while len(self.peers) < CONNECTIONS:
+                peer, _ = self.server.accept()
+                peer.setblocking(False)
+                self.peers[peer] = b""
+        out: list[bytes] = []
+        for peer in list(self.peers):
+            try:
+                data = peer.recv(BUFFER)
+            except BlockingIOError:
+                continue
+            except OSError:
+                data = b""
+            if not data:
+                peer.close()
+                del self.peers[peer]
+                continue
+            *lines, rest = (self.peers[peer] + data).split(b"\n")
+            self.peers[peer] = rest if len(rest) < BUFFER else b""
+            out += lines
+        return out[: self.most]
+
+    def close(self) -> None:
+        """Close all connections and the port."""
+        for peer in self.peers:
+            peer.close()
+        self.server.close()
+
+
+class Serial:
+    """Lines from a serial port (pyserial); a port that goes away is opened again."""
+
+    def __init__(self, port: str, baud: int, most: int) -> None:
+        try:
+            self.serial: Any = importlib.import_module("serial")
+        except ImportError:
+            raise UserError("input.serial needs pyserial: install boresight[serial]") from None
+        self.port, self.baud, self.most, self.rest = port, baud, most, b""
+        self.device: Any = None
+        if not self._open():
+            raise UserError(f"input.serial = '{port}': cannot be opened")
+
+    def _open(self) -> bool:
+        try:
+            self.device = self.serial.Serial(self.port, self.baud, timeout=0)
+        except (OSError, ValueError):
+            self.device = None
+        return self.device is not None
+
+    def read(self) -> list[bytes]:
+        """Return whole lines."""
+        if self.device is None and not self._open():
+            return []
+        try:
+            data = self.device.read(BUFFER)
+        except OSError:
+            self.device = None
+            return []
+        lines: list[bytes] = (self.rest + bytes(data)).split(b"\n")
+        rest = lines.pop()
+        self.rest = rest if len(rest) < BUFFER else b""
+        return lines[: self.most]
+
+    def close(self) -> None:
+        """Close the port."""
+        if self.device is not None:
+            self.device.close()

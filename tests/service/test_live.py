@@ -1,0 +1,244 @@
+"""Live on loopback: UDP in, UDP out, and a real rotctld (Hamlib's dummy rotator) where there is one."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import shutil
+import socket
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boresight.config.site import pointer_for, read_site
+from boresight.errors import UserError
+from boresight.pointing.mount import Mount
+from boresight.service.live import run_live
+from boresight.service.rotctld import Rotator
+
+SITE = """
+[site]
+latitude_deg = 47.0
+longitude_deg = 8.0
+height_m = 400.0
+[beam]
+width_deg = 2.0
+rate_hz = 20.0
+[[source]]
+id = "a"
+sigma_angle_deg = 0.1
+sigma_range_m = 20.0
+[[source]]
+id = "b"
+sigma_angle_deg = 0.2
+sigma_range_m = 20.0
+[[source]]
+id = "own"
+own = true
+sigma_angle_deg = 0.2
+[mount]
+azimuth_rate_deg_s = 20.0
+elevation_rate_deg_s = 20.0
+[input]
+udp = "127.0.0.1:{port}"
+[output]
+udp = "127.0.0.1:{out}"
+command_rate_hz = 10.0
+{rotator}
+"""
+
+
+def free_port(kind: int = socket.SOCK_DGRAM) -> int:
+    with socket.socket(socket.AF_INET, kind) as s:
+        s.bind(("127.0.0.1", 0))
+        return int(s.getsockname()[1])
+
+
+def target(t: float) -> np.ndarray:
+    return np.array([-3000.0 + 200.0 * t, 4000.0, 1500.0])
+
+
+class Sender(threading.Thread):
+    """Three sources at 10 Hz until told to stop."""
+
+    def __init__(self, port: int, begun: float) -> None:
+        super().__init__(daemon=True)
+        self.port, self.begun, self.halt = port, begun, threading.Event()
+
+    def run(self) -> None:
+        rng = np.random.default_rng(50)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+            while not self.halt.wait(0.1):
+                now = time.time()
+                e, n, u = target(now - self.begun)
+                for name, sigma in (("a", 0.1), ("b", 0.2), ("own", 0.2)):
+                    az = math.degrees(math.atan2(e, n)) + sigma * rng.standard_normal()
+                    el = math.degrees(math.atan2(u, math.hypot(e, n))) + sigma * rng.standard_normal()
+                    row = {"source": name, "t_s": now, "azimuth_deg": az, "elevation_deg": el}
+                    if name != "own":
+                        row["range_m"] = float(np.linalg.norm([e, n, u]))
+                    s.sendto(json.dumps(row).encode(), ("127.0.0.1", self.port))
+                s.sendto(b"{broken", ("127.0.0.1", self.port))
+
+
+def run(tmp_path: Path, seconds: float, rotator: str = "", stop=lambda: False):
+    port, out = free_port(), free_port()
+    text = SITE.format(port=port, out=out, rotator=f'rotctld = "{rotator}"' if rotator else "")
+    (tmp_path / "site.toml").write_text(text, encoding="utf-8")
+    station = read_site(tmp_path / "site.toml")
+    listener = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    listener.bind(("127.0.0.1", out))
+    listener.setblocking(False)
+    begun = time.time()
+    sender = Sender(port, begun)
+    sender.start()
+    commands = []
+    try:
+        counts = run_live(station, pointer_for(station), seconds, None, stop=stop)
+        while True:
+            try:
+                commands.append(json.loads(listener.recv(4096)))
+            except BlockingIOError:
+                break
+    finally:
+        sender.halt.set()
+        sender.join()
+        listener.close()
+    return counts, commands, begun
+
+
+def test_reports_in_commands_out(tmp_path: Path) -> None:
+    counts, commands, begun = run(tmp_path, 4.0)
+    assert counts["accepted"] > 60
+    assert counts["malformed"] > 20
+    assert counts["latency_max_s"] < 0.1
+    late = [c for c in commands if c["t_s"] > begun + 3.0]
+    assert len(late) > 20
+    for c in late:
+        e, n, u = target(c["t_aim_s"] - begun)
+        assert abs(c["az_deg"] - math.degrees(math.atan2(e, n))) < 1.0
+        assert abs(c["el_deg"] - math.degrees(math.atan2(u, math.hypot(e, n)))) < 1.0
+        assert c["mode"] == "fused"
+
+
+def ask(port: int) -> tuple[float, float]:
+    with socket.create_connection(("127.0.0.1", port), 2.0) as s:
+        s.sendall(b"p\n")
+        file = s.makefile()
+        return float(file.readline()), float(file.readline())
+
+
+def start_rotctld(port: int) -> subprocess.Popen[bytes]:
+    process = subprocess.Popen(
+        ["rotctld", "-m", "1", "-T", "127.0.0.1", "-t", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    for _ in range(100):
+        try:
+            ask(port)
+            return process
+        except (OSError, ValueError):
+            time.sleep(0.05)
+    raise AssertionError("rotctld does not answer")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("rotctld") is None, reason="Hamlib's rotctld is not installed")
+def test_a_real_rotctld_is_followed_and_found_again(tmp_path: Path) -> None:
+    port = free_port(socket.SOCK_STREAM)
+    process = start_rotctld(port)
+    killed = threading.Event()
+
+    def kill_and_restart() -> None:
+        nonlocal process
+        time.sleep(5.0)
+        process.kill()
+        process.wait()
+        time.sleep(1.0)
+        process = start_rotctld(port)
+        killed.set()
+
+    helper = threading.Thread(target=kill_and_restart)
+    helper.start()
+    try:
+        counts, _, begun = run(tmp_path, 14.0, f"127.0.0.1:{port}")
+        helper.join()
+        assert killed.is_set()
+        assert counts["rotator_connects"] >= 2
+        assert counts["rotator_lost"] >= 1
+        assert counts["rotator_sent"] > 10
+        az, el = ask(port)
+        e, n, u = target(time.time() - begun)
+        # the dummy slews at 6°/s, the target moves at 3°/s; by now it has caught up
+        assert abs(az - math.degrees(math.atan2(e, n))) < 4.0
+        assert abs(el - math.degrees(math.atan2(u, math.hypot(e, n)))) < 4.0
+    finally:
+        process.kill()
+        process.wait()
+
+
+class FakeRotctld(threading.Thread):
+    """Answers as rotctld does, refuses now and then, and keeps every command."""
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        self.server = socket.create_server(("127.0.0.1", 0))
+        self.port = self.server.getsockname()[1]
+        self.commands: list[tuple[float, float]] = []
+        self.at = (10.0, 20.0)
+
+    def run(self) -> None:
+        try:
+            peer, _ = self.server.accept()
+        except OSError:
+            return
+        with peer, peer.makefile() as lines, contextlib.suppress(OSError):
+            for line in lines:
+                word = line.split()
+                if word[0] == "P":
+                    self.at = (float(word[1]), float(word[2]))
+                    self.commands.append(self.at)
+                    peer.sendall(b"RPRT -1\n" if len(self.commands) % 7 == 0 else b"RPRT 0\n")
+                else:
+                    peer.sendall(f"{self.at[0]:.2f}\n{self.at[1]:.2f}\n".encode())
+
+
+def test_no_command_outside_the_limits_is_ever_sent() -> None:
+    """Wild targets, time driven by the test: every command keeps the stops and the slew rate."""
+    rng = np.random.default_rng(60)
+    deg = math.pi / 180
+    mount = Mount((-100 * deg, 100 * deg), (5 * deg, 80 * deg), 7 * deg, 3 * deg)
+    fake = FakeRotctld()
+    fake.start()
+    rotator = Rotator(f"127.0.0.1:{fake.port}", mount, 0.01 * deg, 0.5)
+    now = 0.0
+    for i in range(400):
+        now += 0.25
+        wild = rng.choice([np.nan, np.inf, 1e9, -50.0, 0.5, 2.0])
+        rotator.follow(float(wild if i % 3 else rng.uniform(-4, 4)), float(rng.uniform(-2, 2)), now)
+        time.sleep(0.001)
+    rotator.close()
+    fake.join(2.0)
+    fake.server.close()
+    assert len(fake.commands) > 50
+    sent = np.array(fake.commands)
+    assert (sent[:, 0] >= -100.0).all()
+    assert (sent[:, 0] <= 100.0).all()
+    assert (sent[:, 1] >= 5.0).all()
+    assert (sent[:, 1] <= 80.0).all()
+    # commands are at least 0.5 s apart; one that waited for an answer may be up to 5 s of slewing
+    assert np.abs(np.diff(sent[:, 0])).max() <= 7.0 * 5.0 + 1e-3
+    assert rotator.counts["refused"] > 0
+
+
+def test_inputs_that_cannot_be_are_told(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(SITE.format(port=1, out=2, rotator="").split("[input]")[0], encoding="utf-8")
+    station = read_site(tmp_path / "s.toml")
+    with pytest.raises(UserError, match=r"no \[input\]"):
+        run_live(station, pointer_for(station), 0.1, None)
+    with pytest.raises(UserError, match="host:port"):
+        Rotator("nowhere", Mount(), 0.1, 1.0)
