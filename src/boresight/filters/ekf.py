@@ -8,12 +8,16 @@ import numpy as np
 
 from boresight.errors import UserError
 from boresight.kernels.gaussian import joseph_update, sandwich
+from boresight.kernels.motion import move
+from boresight.kernels.step import predict_step, update_step
 from boresight.models import check
 from boresight.models.base import KernelSensor
 from boresight.models.motion.base import KernelMotion
 from boresight.models.protocols import MeasurementModel, MotionModel
 from boresight.types.sensor import FloatArray
 from boresight.types.state import GaussianState, UpdateInfo
+
+NOTHING = "the measurement has no component that can be used: nothing measured, or zero range"
 
 
 def init(t: float, x: FloatArray, P: FloatArray) -> GaussianState:
@@ -35,6 +39,8 @@ def predict(state: GaussianState, motion: MotionModel, t: float) -> GaussianStat
     dt = t - state.t
     if not dt >= 0.0 or not math.isfinite(dt):
         raise UserError(f"cannot predict from t = {state.t!r} to t = {t!r}: time must not run backwards")
+    if isinstance(motion, KernelMotion) and motion.kernel is move and len(state.x) == motion.state_dimension:
+        return GaussianState(float(t), *predict_step(state.x, state.P, dt, motion.parameters))
     if isinstance(motion, KernelMotion):
         x, F, Q = motion.move(state.x, dt)
     else:
@@ -56,9 +62,14 @@ def update(
     States from `n_estimated` on are considered (Schmidt): they widen the covariance but are not estimated.
     Raises UserError where the report holds no component that can be used, or S is not positive definite.
     """
-    y, H, R = linearised(sensor, z, state.x)
     n = len(state.x) if n_estimated is None else n_estimated
-    x, P, S, nis, log_likelihood = joseph_update(state.x, state.P, y, H, R, n)
+    if isinstance(sensor, KernelSensor):
+        x, P, y, S, nis, log_likelihood = update_step(state.x, state.P, sensor.columns(z), sensor.context, n)
+        if not len(y):
+            raise UserError(NOTHING)
+    else:
+        y, H, R = linearised(sensor, z, state.x)
+        x, P, S, nis, log_likelihood = joseph_update(state.x, state.P, y, H, R, n)
     if math.isnan(nis):
         raise UserError("the innovation covariance is not positive definite: check the prior and the sensor's noise")
     return GaussianState(state.t, x, P), UpdateInfo(y, S, nis, log_likelihood)
@@ -74,6 +85,6 @@ def linearised(sensor: MeasurementModel, z: FloatArray, x: FloatArray) -> tuple[
     seen = np.isfinite(y)
     if not seen.all():
         if not seen.any():
-            raise UserError("the measurement has no component that can be used: nothing measured, or zero range")
+            raise UserError(NOTHING)
         y, H, R = y[seen], H[seen], R[np.ix_(seen, seen)]
     return y, np.ascontiguousarray(H, dtype=float), np.ascontiguousarray(R, dtype=float)

@@ -55,7 +55,7 @@ class UnscentedKalman:
         Y = np.array([sensor.innovation(z, point) for point in X])
         seen = np.isfinite(Y).all(axis=0)
         if not seen.any():
-            raise UserError("the measurement has no component that can be used: nothing measured, or zero range")
+            raise UserError(ekf.NOTHING)
         y, A, Omega = linearise(L, np.ascontiguousarray(Y[:, seen]), self._scaling)
         R = sensor.R(state.x)[np.ix_(seen, seen)]
         x, P, S, nis, log_likelihood = joseph_update(state.x, state.P, y, -A, R + Omega, len(state.x))

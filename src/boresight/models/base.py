@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -24,6 +23,7 @@ class SensorPose(NamedTuple):
 
 
 AT_ORIGIN = SensorPose()
+NOT_MEASURED = np.full(N_COMPONENTS, np.nan)
 
 
 class KernelSensor:
@@ -47,7 +47,8 @@ class KernelSensor:
         """Return the same sensor at another pose: the own ship moves."""
         context = self.context.copy()
         context[observation.POSITION : observation.NOISE] = _place(pose)
-        moved = copy.copy(self)
+        moved = object.__new__(type(self))
+        moved.__dict__.update(self.__dict__)
         object.__setattr__(moved, "pose", pose)
         object.__setattr__(moved, "context", context)
         return moved
@@ -79,7 +80,7 @@ class KernelSensor:
         if np.shape(z) != (self.dimension,):
             names = ", ".join(c.name.lower() for c in self.components)
             raise UserError(f"the measurement must hold {names}: shape ({self.dimension},), not {np.shape(z)}")
-        out = np.full(N_COMPONENTS, np.nan)
+        out = NOT_MEASURED.copy()
         out[list(self.components)] = z
         return out
 
@@ -100,8 +101,8 @@ def _scratch() -> FloatArray:
 
 
 def _place(pose: SensorPose) -> FloatArray:
-    place = np.concatenate([np.ravel(part) for part in pose])
-    if place.shape != (15,) or not np.all(np.isfinite(place)):
+    place = np.concatenate((pose.position, pose.velocity, np.ravel(pose.enu_from_sensor)))
+    if place.shape != (15,) or not np.isfinite(place).all():
         raise UserError("a sensor pose is position (3,), velocity (3,), enu_from_sensor (3, 3), all finite")
     return place
 
