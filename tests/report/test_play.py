@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,19 @@ def test_films_are_readable(recording: Recording, tmp_path: Path) -> None:
         check_film(tmp_path / "x.avi", False)
     with pytest.raises(UserError, match="does not exist"):
         check_film(tmp_path / "no" / "x.gif", False)
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
+def test_an_mp4_has_its_frames(recording: Recording, tmp_path: Path) -> None:
+    scene = Scene(results_of(recording), recording)
+    (film_path,) = film(scene, tmp_path / "x.mp4", [scene.start + 10.0, scene.end], 5.0)
+    assert film_path.read_bytes()[4:8] == b"ftyp"
+
+
+def test_mp4_without_ffmpeg_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(UserError, match=r"needs the program ffmpeg.*give a \.gif"):
+        check_film(tmp_path / "x.mp4", False)
 
 
 def test_nothing_at_all_can_be_played(recording: Recording) -> None:

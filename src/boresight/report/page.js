@@ -218,7 +218,7 @@ function plan() {
   if (show.truth) for (const p of truth) {
     const to = until(p.t, at), from = now === null ? 0 : until(p.t, at - trail);
     ctx.setLineDash([5, 4]); ctx.strokeStyle = "#111"; ctx.lineWidth = 1.5; line(p, from, to, Infinity); ctx.setLineDash([]);
-    if (to > from && (now === null || at <= p.t[p.t.length - 1] + T)) { mark(px(p.x[to - 1]), py(p.y[to - 1]), "#111", 2.5); if (truth.length <= 12) label(p.id, p.x[to - 1], p.y[to - 1], "#111", -8); }
+    if (to > from && (now === null || at <= p.t[p.t.length - 1] + T)) { if (truth.length <= 100) mark(px(p.x[to - 1]), py(p.y[to - 1]), "#111", 2.5); if (truth.length <= 12) label(p.id, p.x[to - 1], p.y[to - 1], "#111", -8); }
   }
   if (show.tracks) for (const p of D.tracks) {
     const to = until(p.t, at), from = now === null ? 0 : until(p.t, at - trail);
@@ -308,9 +308,9 @@ canvas.addEventListener("pointermove", e => {
 });
 canvas.addEventListener("pointerleave", () => tip.style.display = "none");
 const thinned = [];
-if (D.track_step > 1) thinned.push(`tracks: every ${D.track_step}th row of ${D.track_rows}`);
-if (sensors.length && sensors[0].step > 1) thinned.push(`detections: every ${sensors[0].step}th`);
-$("plan-note").textContent = "North is up. Hover for a track; drag to move; double-click or Ctrl + wheel to zoom." + (thinned.length ? ` To keep the file small this page shows of ${thinned.join(", of ")}.` : "") + (D.tracks.length ? "" : " The tracker reported no track.");
+if (D.track_step > 1) thinned.push(`one track row in ${D.track_step} (of ${D.track_rows})`);
+if (sensors.length && sensors[0].step > 1) thinned.push(`one detection in ${sensors[0].step}`);
+$("plan-note").textContent = "North is up. Hover for a track; drag to move; double-click or Ctrl + wheel to zoom." + (thinned.length ? ` To keep the file small this picture shows ${thinned.join(" and ")}.` : "") + (D.tracks.length ? "" : " The tracker reported no track.");
 drawn(plan); setTime(null);
 
 // ---------- height
