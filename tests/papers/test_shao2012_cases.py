@@ -14,7 +14,7 @@ def rows(case: str, runs: int) -> dict[Any, dict[str, Any]]:
     return {(r["method"], r["time_s"]): r for r in CASES[case](runs, np.random.default_rng(1))}
 
 
-@pytest.mark.parametrize("runs", [60, pytest.param(500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [60, pytest.param(300, marks=pytest.mark.slow)])
 def test_cases(runs: int) -> None:
     slack = 1.2 if runs == 60 else 1.0  # an RMS over 60 runs has a relative deviation of 9 %; two of them
     weave = rows("weave", runs)

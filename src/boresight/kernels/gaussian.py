@@ -76,6 +76,34 @@ def sandwich(A: FloatArray, P: FloatArray, Q: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
+def _joseph(A: FloatArray, P: FloatArray, K: FloatArray, R: FloatArray) -> FloatArray:
+    """Return A P Aᵀ + K R Kᵀ, exactly symmetric."""
+    n, m = K.shape
+    AP, KR, out = np.empty((n, n)), np.empty((n, m)), np.empty((n, n))
+    for i in range(n):
+        for j in range(n):
+            s = 0.0
+            for k in range(n):
+                s += A[i, k] * P[k, j]
+            AP[i, j] = s
+        for a in range(m):
+            s = 0.0
+            for b in range(m):
+                s += K[i, b] * 0.5 * (R[b, a] + R[a, b])
+            KR[i, a] = s
+    for i in range(n):
+        for j in range(i + 1):
+            s = 0.0
+            for k in range(n):
+                s += AP[i, k] * A[j, k]
+            for a in range(m):
+                s += KR[i, a] * K[j, a]
+            out[i, j] = s
+            out[j, i] = s
+    return out
+
+
+@njit(cache=True)
 def joseph_update(
     x: FloatArray, P: FloatArray, y: FloatArray, H: FloatArray, R: FloatArray, n_estimated: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, float, float]:
@@ -89,30 +117,35 @@ def joseph_update(
     """
     n = x.shape[0]
     m = y.shape[0]
-    S = sandwich(H, P, R)
-    L = np.empty((m, m))
-    if not cholesky(S, L):
-        return x.copy(), P.copy(), S, np.nan, np.nan
-    K = np.zeros((n, m))
-    column = np.empty(m)
-    for i in range(n_estimated):
+    K = np.empty((n, m))  # first PHᵀ
+    S, L = np.empty((m, m)), np.empty((m, m))
+    for i in range(n):
         for a in range(m):
             s = 0.0
             for k in range(n):
                 s += P[i, k] * H[a, k]
-            column[a] = s
-        solve_lower(L, column)
-        solve_upper(L, column)
-        for a in range(m):
-            K[i, a] = column[a]
-    log_det = 0.0
+            K[i, a] = s
     for a in range(m):
-        column[a] = y[a]
+        for b in range(a + 1):
+            s = 0.5 * (R[a, b] + R[b, a])
+            for k in range(n):
+                s += 0.5 * (H[a, k] * K[k, b] + H[b, k] * K[k, a])
+            S[a, b] = s
+            S[b, a] = s
+    if not cholesky(S, L):
+        return x.copy(), P.copy(), S, np.nan, np.nan
+    for i in range(n):
+        if i < n_estimated:
+            solve_lower(L, K[i])
+            solve_upper(L, K[i])
+        else:
+            K[i, :] = 0.0
+    white = y.copy()
+    solve_lower(L, white)
+    nis, log_det = 0.0, 0.0
+    for a in range(m):
+        nis += white[a] * white[a]
         log_det += 2.0 * math.log(L[a, a])
-    solve_lower(L, column)
-    nis = 0.0
-    for a in range(m):
-        nis += column[a] * column[a]
     x_new = x.copy()
     A = np.empty((n, n))
     for i in range(n):
@@ -123,5 +156,5 @@ def joseph_update(
             for a in range(m):
                 s -= K[i, a] * H[a, j]
             A[i, j] = s
-    P_new = sandwich(A, P, sandwich(K, R, np.zeros((n, n))))
+    P_new = _joseph(A, P, K, R)
     return x_new, P_new, S, nis, -0.5 * (nis + log_det + m * math.log(2.0 * math.pi))
