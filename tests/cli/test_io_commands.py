@@ -6,6 +6,7 @@ import json
 import os
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 
 from boresight.io import read_recording, write_results
@@ -92,7 +93,8 @@ def test_an_unwritable_folder_is_named(run: Run, tmp_path: Path) -> None:
 def test_an_output_under_a_file_is_named(run: Run, tmp_path: Path) -> None:
     detections, sensors = files(tmp_path)
     refused(run("import", "csv", detections, "--sensors", sensors, "-o", detections / "rec"), "cannot be made")
-    refused(run("import", "csv", detections, "--sensors", sensors, "-o", detections), "not a folder")
+    (tmp_path / "file").write_text("x")
+    refused(run("import", "csv", detections, "--sensors", sensors, "-o", tmp_path / "file"), "not a folder")
 
 
 def test_usage_errors_are_one_line(run: Run, tmp_path: Path) -> None:
@@ -102,3 +104,34 @@ def test_usage_errors_are_one_line(run: Run, tmp_path: Path) -> None:
     refused(run("info", tmp_path, "--jsn"), "--json")
     refused(run("import", "autoferry", tmp_path / "none.json", "-o", tmp_path / "r"), "no such file")
     refused(run("export", tmp_path / "none", "--to", "kml"), "no such results folder")
+
+
+def test_force_never_destroys_an_input_or_other_files(run: Run, rec: Path, out: Path, tmp_path: Path) -> None:
+    words = ("import", "csv", tmp_path / "d.csv", "--sensors", rec / "recording.toml")
+    refused(run(*words, "-o", rec, "--force"), "its own input")
+    refused(run(*words, "-o", tmp_path, "--force"), "its own input")
+    refused(run(*words, "-o", out, "--force"), "did not write")  # results are no recording
+    refused(run("track", rec, "-o", rec, "--force"), "its own input")
+    refused(run("track", rec, "-o", rec.parent, "--force"), "its own input")
+    assert (rec / "detections.parquet").exists()
+
+
+def test_odd_files_are_refused_in_one_line(run: Run, rec: Path, tmp_path: Path) -> None:
+    (tmp_path / "semi.csv").write_text("t_s;sensor;scan;range_m\n1;radar;0;5\n")
+    refused(
+        run("import", "csv", tmp_path / "semi.csv", "--sensors", tmp_path / "s.toml", "-o", tmp_path / "x"), "commas"
+    )
+    refused(run("import", "csv", rec, "--sensors", tmp_path / "s.toml", "-o", tmp_path / "x"), "cannot be read")
+    refused(run("info", rec / "detections.parquet"), "not a recording folder")
+    big = tmp_path / "big.json"
+    big.write_text(f'[{{"sensorID": 3, "time": {10**400}, "ownshipPosition": [0, 0], "measurement": 1}}]')
+    refused(run("import", "autoferry", big, "-o", tmp_path / "x"), "entry 0: time")
+    text = (rec / "recording.toml").read_text()
+    (rec / "recording.toml").write_text(text.replace("sigma_range_m = 5.0", f"sigma_range_m = {10**400}"))
+    refused(run("info", rec), "sigma_range_m")
+
+
+def test_a_column_that_stands_twice_is_refused(run: Run, rec: Path) -> None:
+    table = pq.read_table(rec / "detections.parquet")
+    pq.write_table(table.append_column("t_s", table["t_s"]), rec / "detections.parquet")
+    refused(run("info", rec), "'t_s' stands twice")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from boresight.io.files import check_output
+from boresight.io.files import RECORDING, check_output
 from boresight.io.recording import write_recording
 from boresight.types import Recording
 
@@ -37,7 +37,7 @@ def autoferry(
     """
     from boresight.io.autoferry import TRACKER_TOML, import_autoferry
 
-    check_output(output, force)
+    check_output(output, force, RECORDING, [detections, truth, ignore])
     _finish(import_autoferry(detections, truth, ignore), output, force, {"tracker.toml": TRACKER_TOML})
 
 
@@ -74,7 +74,7 @@ def csv(
     """
     from boresight.io.user_csv import import_csv
 
-    check_output(output, force)
+    check_output(output, force, RECORDING, [detections, sensors, platform, truth, ignore])
     _finish(import_csv(detections, sensors, platform, truth, ignore), output, force)
 
 

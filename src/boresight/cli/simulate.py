@@ -32,11 +32,11 @@ def simulate(
     import numpy as np
 
     from boresight.config.scenario import read_scenario
-    from boresight.io.files import check_output
+    from boresight.io.files import RECORDING, check_output
     from boresight.io.recording import write_recording
     from boresight.sim.scenario import simulate as run
 
-    check_output(output, force)
+    check_output(output, force, RECORDING, [scenario])
     plan, chosen = read_scenario(scenario, seed)
     recording = run(plan, np.random.default_rng(chosen))
     write_recording(recording, output, force)

@@ -57,7 +57,7 @@ def track(
     json
         Print one JSON object instead of a line.
     """
-    check_output(output, force)
+    check_output(output, force, inputs=[rec, config])
     recording = read_recording(rec)
     ids = [s.strip() for s in sensors.split(",") if s.strip()] if sensors is not None else None
     if ids == []:

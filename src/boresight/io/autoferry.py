@@ -158,7 +158,7 @@ def _read_list(path: Path) -> list[Any]:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    return isinstance(value, float) or (type(value) is int and abs(value) < 2**63)
 
 
 def _number(path: Path, entry: int, item: dict[str, Any], key: str) -> float:

@@ -6,12 +6,12 @@ import contextlib
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from boresight.errors import UserError
 
-OURS = ("recording.toml", "summary.json")  # a folder that holds one of these was written by us and may be replaced
+RECORDING, RESULTS = "recording.toml", "summary.json"  # what tells that a folder is one of ours, to be replaced
 
 
 def reason(error: OSError) -> str:
@@ -45,14 +45,22 @@ def read_text(path: Path) -> str:
     return text
 
 
-def check_output(path: Path, force: bool) -> None:
-    """Raise UserError when `path` may not become an output folder: it exists without `force`, or is not ours."""
+def check_output(path: Path, force: bool, marker: str = RESULTS, inputs: Iterable[Path | None] = ()) -> None:
+    """Raise UserError when `path` may not become an output folder.
+
+    It may not when it exists without `force`, holds other people's files (a folder with `marker` is ours), or when one
+    of the `inputs` lies in it, which replacing it would destroy.
+    """
+    here = path.resolve()
+    for given in inputs:
+        if given is not None and (given.resolve() == here or here in given.resolve().parents):
+            raise UserError(f"{path}: the output would replace its own input {given}; choose another output folder")
     if path.is_dir():
         if not force:
             raise UserError(f"{path}: the output folder exists; give --force to replace it")
         inside = {p.name for p in path.iterdir()}
-        if inside and not inside & set(OURS):
-            raise UserError(f"{path}: holds files that boresight did not write; choose another output folder")
+        if inside and marker not in inside:
+            raise UserError(f"{path}: holds files that this command did not write; choose another output folder")
     elif path.exists() or path.is_symlink():
         raise UserError(f"{path}: exists and is not a folder; choose another output folder")
     try:
@@ -62,13 +70,13 @@ def check_output(path: Path, force: bool) -> None:
 
 
 @contextlib.contextmanager
-def output_folder(path: Path | str, force: bool = False) -> Iterator[Path]:
+def output_folder(path: Path | str, force: bool = False, marker: str = RESULTS) -> Iterator[Path]:
     """Give a temporary folder beside `path` that takes its name when the block ends well, and vanishes when not.
 
     Raises UserError when `path` exists and `force` is not given, or cannot be written.
     """
     path = Path(path)
-    check_output(path, force)
+    check_output(path, force, marker)
     parent = path.absolute().parent
     try:
         work = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=parent))

@@ -11,7 +11,7 @@ from boresight.errors import UserError, did_you_mean
 from boresight.io import detections as det
 from boresight.io import paths
 from boresight.io.declaration import Declaration, read_declaration, write_declaration
-from boresight.io.files import output_folder
+from boresight.io.files import RECORDING, output_folder
 from boresight.io.table import Table, read_table, write_table
 from boresight.types import Axes, Detections, PlatformTrack, Recording, Sensor
 
@@ -93,7 +93,7 @@ def write_recording(
 
     `extras` are further text files by name, such as the tracker.toml that suits the recording's sensors.
     """
-    with output_folder(path, force) as folder:
+    with output_folder(path, force, RECORDING) as folder:
         declared = Declaration(recording.name, recording.dimensions, recording.site, recording.sensors)
         (folder / "recording.toml").write_text(write_declaration(declared), encoding="utf-8")
         write_table(folder / "detections.parquet", det.columns_of(recording.detections, recording.sensors))

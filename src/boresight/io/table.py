@@ -111,9 +111,6 @@ def read_csv(path: Path | str, schema: Mapping[str, str], required: Sequence[str
     path = Path(path)
     rows = _csv_rows(path)
     header = [name.strip() for name in rows[0]]
-    for name in header:
-        if header.count(name) > 1:
-            raise UserError(f"{path}: column '{name}' stands twice")
     if "" in header:
         raise UserError(f"{path}: column {header.index('') + 1} of the header line has no name")
     _check_names(path, header, schema, required, False)
@@ -161,7 +158,11 @@ def _csv_column(path: Path, name: str, cells: list[str], kind: str) -> pa.Array:
 def _check_names(
     path: Path, names: Sequence[str], schema: Mapping[str, str], required: Sequence[str], others: bool
 ) -> None:
+    if len(names) == 1 and any(mark in names[0] for mark in ";\t"):
+        raise UserError(f"{path}: one column '{names[0][:40]}'; separate columns by commas")
     for name in names:
+        if list(names).count(name) > 1:
+            raise UserError(f"{path}: column '{name}' stands twice")
         if name not in schema and not others:
             missing = [k for k in schema if k not in names]
             raise UserError(f"{path}: unknown column '{name}'{did_you_mean(name, missing)}")
