@@ -32,6 +32,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "export": ("boresight.cli.export:export", "Write tracks as CSV, GeoJSON or KML."),
     "convert": ("boresight.cli.convert:convert", "Turn pixels, az/el, ENU, NED, ECEF and geodetic into each other."),
     "point": ("boresight.cli.point:point", "Point an antenna or beam at what the sources report."),
+    "passes": ("boresight.cli.passes:passes", "List satellite passes, and whether the mount can follow."),
     "paper": ("boresight.cli.paper:app", "Print a paper's table: as printed, corrected, and ours."),
 }
 

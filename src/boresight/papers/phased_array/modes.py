@@ -88,8 +88,8 @@ def repaired(p: Pass) -> FloatArray:
             square.append(_square(ahead[:, n]))
         variance = declared[there, n]
         if len(square) >= 5:
-            mean = np.mean(square[-MEMORY:], axis=0)
-            variance = three_cornered_hat(mean, declared_floor(declared[:, n]))[there]
+            typical = np.median(square[-MEMORY:], axis=0)  # one bad stretch is not to speak for all
+            variance = three_cornered_hat(typical, declared_floor(declared[:, n]))[there]
         out[n] = unit(inverse_variance(variance) @ ahead[there, n])
     return out
 
@@ -133,8 +133,10 @@ class _Line:
             rows = polynomial_weights(times, [*times, at], 2)
             off = np.abs(values - rows[:-1] @ values).max(axis=1)
             worst = int(np.argmax(off))
-            if off[worst] <= LEFT_OUT * self.sigma[-1] or len(times) <= 5:
+            if off[worst] <= LEFT_OUT * self.sigma[-1]:
                 return rows[-1] @ values, float(np.sqrt(rows[-1] @ rows[-1]))
+            if len(times) <= 5:
+                return None
             times, values = np.delete(times, worst), np.delete(values, worst, axis=0)
 
 
