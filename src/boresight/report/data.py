@@ -27,7 +27,8 @@ TIME, PLACE = 100.0, 10.0  # times in 10 ms, places in 0.1 m
 def collect(results: Results, recording: Recording | None) -> dict[str, Any]:
     """Return the report's data; without a recording only what the results hold."""
     summary = results.summary
-    about = summary.get("recording") or {}
+    about = summary.get("recording")
+    about = about if isinstance(about, dict) else {}
     first, last = _span(results, recording)
     data: dict[str, Any] = {
         "version": summary.get("version", __version__),
