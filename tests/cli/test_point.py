@@ -112,3 +112,50 @@ def test_mistakes_end_with_one_line(run: Run, files: tuple[Path, Path], tmp_path
     assert says in done.err
     assert done.err.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+SHIP = """
+[[platforms]]
+id = "ship"
+kind = "constant_velocity"
+position_enu_m = [500.0, -300.0, 0.0]
+velocity_enu_m_s = [4.0, 6.0, 0.0]
+attitude = { yaw_deg = 30.0, sway_ypr_deg = [2.0, 3.0, 8.0], sway_period_s = [14.0, 6.5, 9.0] }
+navigation = { rate_hz = 20.0 }
+"""
+
+
+def test_an_antenna_on_a_rolling_ship(run: Run, tmp_path: Path) -> None:
+    """Face angles against the truth, turned by the ship's true attitude when the beam is there."""
+    from boresight.frames.array_face import Pole, angles_from_face, enu_from_face
+    from boresight.frames.attitude import enu_from_body
+
+    text = SCENARIO.replace("[[targets]]", SHIP + "[[targets]]").replace(
+        'kind = "radar"', 'kind = "radar"\nplatform = "ship"\naxes = "platform_enu"'
+    )
+    (tmp_path / "scenario.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "site.toml").write_text('platform = "ship"\n' + SITE, encoding="utf-8")
+    rec, out = tmp_path / "rec", tmp_path / "out"
+    assert run("simulate", tmp_path / "scenario.toml", "-o", rec, "--seed", 3).code == 0
+    done = run("point", tmp_path / "site.toml", "--replay", rec, "-o", out)
+    assert done.code == 0, done.err
+    d = {k: np.array(v) for k, v in pq.read_table(out / "pointing.parquet").to_pydict().items()}
+    truth = pq.read_table(rec / "truth.parquet").to_pydict()
+    t = d["t_aim_s"]
+    p = np.stack([np.interp(t, truth["t_s"], truth[k]) for k in ("east_m", "north_m", "up_m")], axis=-1)
+    p = p - np.array([500.0, -300.0, 0.0]) - t[:, None] * [4.0, 6.0, 0.0]
+    wave = 2 * np.pi * t
+    yaw, pitch, roll = 30 + 2 * np.sin(wave / 14), 3 * np.sin(wave / 6.5), 8 * np.sin(wave / 9)
+    body = enu_from_body(*np.radians([yaw, pitch, roll]))
+    face = body @ [[0, 1, 0], [1, 0, 0], [0, 0, -1]] @ enu_from_face(np.radians(-60.0), np.radians(30.0))
+    az, el, _ = angles_from_face(np.einsum("nji,nj->ni", face, p), Pole.IN_FACE)
+    late = (d["t_s"] > 15.0) & (t < 59.0)
+    off = np.hypot((d["face_az_deg"] - np.degrees(az)) * np.cos(el), d["face_el_deg"] - np.degrees(el))[late]
+    # own error about 0.1°; half a second of foretold attitude adds up to ½ · 8° (2π/9)² · 0.5² = 0.5°
+    assert off.max() < 1.2
+    assert np.median(off) < 0.5
+    wrong = (tmp_path / "site.toml").read_text(encoding="utf-8").replace('"ship"', '"shipp"')
+    (tmp_path / "bad.toml").write_text(wrong, encoding="utf-8")
+    told = run("point", tmp_path / "bad.toml", "--replay", rec, "-o", tmp_path / "no")
+    assert told.code == 2
+    assert "did you mean 'ship'" in told.err

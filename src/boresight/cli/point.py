@@ -55,6 +55,8 @@ def point(
 
     station = read_site(site)
     if replay is None:
+        if station.file.platform is not None:
+            raise UserError(f"{site}: platform goes with --replay: live there is no navigation data yet")
         from boresight.service.live import run_live
 
         if output is not None:
@@ -72,7 +74,8 @@ def point(
 
     check_output(output, force)
     recording = read_recording(replay)
-    pointings = [p for p, _ in run(pointer_for(station, recording), recording, station.file.beam.rate_hz)]
+    chain = pointer_for(station, recording)
+    pointings = [p for p, _ in run(chain, recording, station.file.beam.rate_hz, station.file.platform)]
     if not pointings:
         raise UserError(f"{replay}: no report with a range or a position: nothing to point at")
     with output_folder(output, force) as folder:

@@ -87,6 +87,7 @@ class OutputTable(TableModel, frozen=True):
     """`[output]`: where commands go."""
 
     udp: str | None = None
+    tcp: str | None = None
     rotctld: str | None = None
     dead_band_deg: float = 0.1
     command_rate_hz: float = 2.0
@@ -102,6 +103,7 @@ class SiteFile(TableModel, frozen=True):
     dynamics: DynamicsTable = DynamicsTable()
     choice: Literal["auto", "guide", "own"] = "auto"
     stale_s: float = 3.0
+    platform: str | None = None
     source: tuple[SourceTable, ...] = ()
     input: InputTable = InputTable()
     output: OutputTable = OutputTable()

@@ -37,8 +37,12 @@ def tangent_basis(direction: ArrayLike) -> FloatArray:
     level = rho > 0
     east = np.where(level, d[:, 1], 1.0) / np.where(level, rho, 1.0)
     south = np.where(level, -d[:, 0], 0.0) / np.where(level, rho, 1.0)
-    right = np.stack([east, south, np.zeros_like(rho)], axis=-1)
-    return np.stack([right, np.cross(right, d)], axis=1).reshape(*shape, 2, 3)
+    out = np.zeros((len(d), 2, 3))
+    out[:, 0, 0], out[:, 0, 1] = east, south
+    out[:, 1, 0] = south * d[:, 2]  # right × d
+    out[:, 1, 1] = -east * d[:, 2]
+    out[:, 1, 2] = east * d[:, 1] - south * d[:, 0]
+    return out.reshape(*shape, 2, 3)
 
 
 def tangent_from_direction(centre: ArrayLike, direction: ArrayLike) -> FloatArray:

@@ -13,7 +13,8 @@ from boresight.frames.azel import azel_from_enu, azel_from_enu_jacobian
 from boresight.frames.tangent import tangent_basis, unit
 from boresight.types.sensor import FloatArray
 
-_TURN = np.linspace(0.0, 2.0 * np.pi, 256, endpoint=False)
+_COS2 = np.cos(np.linspace(0.0, 2.0 * np.pi, 256, endpoint=False)) ** 2
+_SIN2 = 1.0 - _COS2
 
 
 class Aim(NamedTuple):
@@ -38,13 +39,14 @@ def probability_in_beam(covariance: ArrayLike, radius: float) -> float:
     g = e'S⁻¹e; the periodic integral over φ by 256 even points. Raises UserError for a covariance that is none.
     """
     S = np.asarray(covariance, dtype=np.float64)
-    values, _ = np.linalg.eigh(S)
-    if not (np.isfinite(values).all() and values[0] >= 0.0):
+    mean, half = 0.5 * float(S[0, 0] + S[1, 1]), float(np.hypot(0.5 * (S[0, 0] - S[1, 1]), S[0, 1]))
+    values = (mean - half, mean + half)
+    if not (-1e-12 * values[1] <= values[0] < np.inf):
         raise UserError("the direction's covariance is not positive")
     if values[1] == 0.0:
         return 1.0
     low = max(values[0], 1e-8 * values[1])  # a line is a very thin ellipse
-    g = np.cos(_TURN) ** 2 / low + np.sin(_TURN) ** 2 / values[1]
+    g = _COS2 / low + _SIN2 / values[1]
     if low < 1e-2 * values[1]:  # thin: the average over φ is peaked, integrate over the thick axis instead
         return _thin(low, values[1], radius)
     return float(np.mean(-np.expm1(-0.5 * g * radius**2) / g) / np.sqrt(low * values[1]))

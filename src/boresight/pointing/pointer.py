@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -101,14 +102,18 @@ class Pointer:
             state.last[source] = max(state.last[source], t)
         return fate
 
-    def tick(self, state: PointerState, t: float) -> tuple[PointerState, Pointing | None]:
-        """Return the command at time `t` (s); None before the first report with a range."""
+    def tick(self, state: PointerState, t: float, place: Place | None = None) -> tuple[PointerState, Pointing | None]:
+        """Return the command at time `t` (s); None before the first report with a range.
+
+        `place` is the antenna's at the time it aims for, if it moves; angles are in the site's ENU.
+        """
         predicted = self.guide.predict(state.guide, t + self.lead)
         if predicted is None:
             return state, None
-        R = ecef_from_enu_rotation(self.site)
-        here = np.array(ecef_from_enu(0.0, 0.0, 0.0, self.site))
-        args = (enu_from_face(*self.face), self.pole, 0.5 * self.beam_width)
+        R, here, face = _geometry(self.site, self.face)
+        if place is not None:
+            here, face = place.position, place.enu_from_face
+        args = (face, self.pole, 0.5 * self.beam_width)
         to_target, velocity = (predicted.position - here) @ R, predicted.velocity @ R
         covariance = R.T @ predicted.covariance @ R
         aim = aim_at(to_target, velocity, covariance, *args)
@@ -140,6 +145,19 @@ class Pointer:
         if (fresh & own).any():
             return Mode.OWN
         return Mode.SEARCH if aim.p_in_beam < self.search_below else Mode.COAST
+
+
+class Place(NamedTuple):
+    """Where a moving antenna is and how its face is turned."""
+
+    position: FloatArray  # (3,) ECEF m
+    enu_from_face: FloatArray  # (3, 3)
+
+
+@lru_cache(maxsize=16)
+def _geometry(site: Site, face: tuple[float, float, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    here = np.array(ecef_from_enu(0.0, 0.0, 0.0, site))
+    return ecef_from_enu_rotation(site), here, enu_from_face(*face)
 
 
 class PointerState(NamedTuple):

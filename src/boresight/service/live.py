@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import select
 import socket
 import time
 from collections.abc import Callable
@@ -15,9 +16,9 @@ from boresight.errors import UserError
 from boresight.pointing.pointer import Pointer, PointerState, Pointing
 from boresight.service.feed import PER_TICK, Feed, origins
 from boresight.service.rotctld import Rotator
-from boresight.service.sockets import Input, Serial, Tcp, Udp, address
+from boresight.service.sockets import Broadcast, Input, Serial, Tcp, Udp, address
 
-POLL = 0.002  # s between looks at the inputs
+POLL = 0.005  # s between looks at inputs that cannot be waited for
 
 
 def run_live(
@@ -38,6 +39,7 @@ def run_live(
     feed = Feed(pointer, origins(station.site, offsets))
     out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM) if file.output.udp else None
     goal = address(file.output.udp, "output.udp") if file.output.udp else ("", 0)
+    stream = Broadcast(file.output.tcp) if file.output.tcp else None
     rotator = None
     if file.output.rotctld:
         band, period = math.radians(file.output.dead_band_deg), 1.0 / file.output.command_rate_hz
@@ -54,12 +56,14 @@ def run_live(
                         pointer.take(state, *report)
                         arrived = now
             if now < tick:
-                time.sleep(min(POLL, tick - now))
+                _wait(inputs, tick - now)
                 continue
             state, pointing = pointer.tick(state, now)
             if pointing is not None:
                 if out is not None:
                     out.sendto(encode(pointing), goal)
+                if stream is not None:
+                    stream.send(encode(pointing))
                 if rotator is not None:
                     rotator.follow(pointing.aim.azimuth, pointing.aim.elevation, now)
                 if not math.isnan(arrived):
@@ -77,6 +81,8 @@ def run_live(
             source.close()
         if out is not None:
             out.close()
+        if stream is not None:
+            stream.close()
         if rotator is not None:
             rotator.close()
         if status is not None:
@@ -124,6 +130,13 @@ def _inputs(station: Station) -> list[Input]:
     if not inputs:
         raise UserError("the site file has no [input]: give udp, tcp or serial, or use --replay")
     return inputs
+
+
+def _wait(inputs: list[Input], longest: float) -> None:
+    """Sleep until something arrives or `longest` (s) has passed."""
+    files = [f for source in inputs for f in source.files()]
+    asked = any(not source.files() for source in inputs)
+    select.select(files, [], [], min(longest, POLL) if asked else longest)
 
 
 def _warm(pointer: Pointer) -> PointerState:

@@ -7,28 +7,38 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from boresight.errors import UserError, did_you_mean
+from boresight.frames.array_face import enu_from_face
 from boresight.frames.local import ecef_from_enu, ecef_from_enu_rotation
-from boresight.frames.pose import pose_track, sensor_pose
+from boresight.frames.pose import PoseTrack, pose_track, sensor_pose
 from boresight.io.scans import iter_scans
 from boresight.kernels.guide import DIRECTION
-from boresight.pointing.pointer import Pointer, PointerState, Pointing
+from boresight.pointing.pointer import Place, Pointer, PointerState, Pointing
 from boresight.types import Component, FloatArray, Recording, Scan
 
+FRD_FROM_RFU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 POSITION = slice(Component.EAST, Component.UP + 1)
 
 
-def replay(pointer: Pointer, recording: Recording, rate: float) -> Iterator[tuple[Pointing, PointerState]]:
+def replay(
+    pointer: Pointer, recording: Recording, rate: float, platform: str | None = None
+) -> Iterator[tuple[Pointing, PointerState]]:
     """Yield a command at every tick of `rate` (Hz), from what had arrived by then; live and replay are one chain.
+
+    `platform` carries the antenna: its pose is foretold to the aim time from the navigation data known at the tick,
+    and the face is turned with it. Raises UserError for a platform that the recording does not have, or one without
+    attitude.
 
     Of a look with several detections the one nearest to the prediction is taken (before there is one: the first).
     """
     tracks = {p.id: pose_track(p, recording.site) for p in recording.platforms}
+    carrier = _carrier(tracks, platform)
     state = pointer.init()
     first = recording.detections.t_recv[0] if len(recording.detections) else 0.0
     k, tick = 0, float(first)
     for scan in iter_scans(recording):
         while tick < scan.t_recv:
-            state, out = pointer.tick(state, tick)
+            state, out = pointer.tick(state, tick, _place(pointer, carrier, tick))
             if out is not None:
                 yield out, state
             k += 1
@@ -42,9 +52,28 @@ def replay(pointer: Pointer, recording: Recording, rate: float) -> Iterator[tupl
         report = _chosen(pointer, state, scan, t, origin, enu_from_sensor, recording)
         if report is not None:
             pointer.take(state, scan.sensor, *report)
-    state, out = pointer.tick(state, tick)
+    state, out = pointer.tick(state, tick, _place(pointer, carrier, tick))
     if out is not None:
         yield out, state
+
+
+def _carrier(tracks: dict[str, PoseTrack], platform: str | None) -> PoseTrack | None:
+    if platform is None:
+        return None
+    if platform not in tracks:
+        raise UserError(f"the recording has no platform '{platform}'{did_you_mean(platform, tracks)}")
+    if not tracks[platform].has_attitude:
+        raise UserError(f"platform '{platform}' has no attitude: it cannot carry the antenna")
+    return tracks[platform]
+
+
+def _place(pointer: Pointer, carrier: PoseTrack | None, t: float) -> Place | None:
+    if carrier is None:
+        return None
+    pose = carrier.until(t).at(t + pointer.lead)
+    e, n, u = (float(v) for v in pose.position)
+    enu_from_rfu = pose.enu_from_body @ FRD_FROM_RFU
+    return Place(np.array(ecef_from_enu(e, n, u, pointer.site)), enu_from_rfu @ enu_from_face(*pointer.face))
 
 
 def _chosen(

@@ -20,6 +20,10 @@ class Input(Protocol):
         """Return whole datagrams or lines that have arrived, without waiting."""
         ...
 
+    def files(self) -> list[socket.socket]:
+        """Return what to wait on; empty if it can only be asked."""
+        ...
+
     def close(self) -> None:
         """Give it back."""
         ...
@@ -53,6 +57,10 @@ class Udp:
             while len(out) < self.most:
                 out.append(self.socket.recv(BUFFER))
         return out
+
+    def files(self) -> list[socket.socket]:
+        """Return the socket."""
+        return [self.socket]
 
     def close(self) -> None:
         """Close the socket."""
@@ -99,6 +107,10 @@ class Tcp:
             out += lines
         return out[: self.most]
 
+    def files(self) -> list[socket.socket]:
+        """Return the port and the connections."""
+        return [self.server, *self.peers]
+
     def close(self) -> None:
         """Close all connections and the port."""
         for peer in self.peers:
@@ -140,7 +152,34 @@ class Serial:
         self.rest = rest if len(rest) < BUFFER else b""
         return lines[: self.most]
 
+    def files(self) -> list[socket.socket]:
+        """Return nothing: a serial port is asked."""
+        return []
+
     def close(self) -> None:
         """Close the port."""
         if self.device is not None:
             self.device.close()
+
+
+class Broadcast:
+    """A TCP port that sends every line to whoever is connected; one that does not read is dropped."""
+
+    def __init__(self, text: str) -> None:
+        self.tcp = Tcp(text, 0)
+
+    def send(self, line: bytes) -> None:
+        """Send a line to all, without waiting."""
+        self.tcp.read()
+        for peer in list(self.tcp.peers):
+            try:
+                if peer.send(line) == len(line):
+                    continue
+            except OSError:
+                pass
+            peer.close()
+            del self.tcp.peers[peer]
+
+    def close(self) -> None:
+        """Close all connections and the port."""
+        self.tcp.close()
