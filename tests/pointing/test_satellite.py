@@ -82,3 +82,22 @@ def test_bad_elements_are_told() -> None:
         read_tle(one[:20] + ("1" if one[20] != "1" else "2") + one[21:] + "\n" + two, "x")
     named = read_tle(f"0 CBERS\n{one}\n{two}\n", "x")
     assert named[0].name == "CBERS"
+
+
+def test_mean_elements_say_the_same() -> None:
+    """An OMM message made of the two lines gives the same place to the printed digits."""
+    import json
+
+    from sgp4.exporter import export_omm
+
+    from boresight.pointing.satellite import read_elements
+
+    (one,) = read_elements("\n".join(tle("28057")), "x")
+    message = export_omm(one.record, "CBERS 2")
+    (other,) = read_elements(json.dumps([message], default=str), "x")
+    begin = unix_of(one.record.jdsatepoch, one.record.jdsatepochF)
+    a, b = (look(s, [begin, begin + 3600.0], SITE) for s in (one, other))
+    np.testing.assert_allclose(a[2], b[2], rtol=1e-6)
+    assert other.name == "CBERS 2"
+    with pytest.raises(UserError, match="not orbit mean elements"):
+        read_elements('[{"OBJECT_NAME": "X"}]', "x")

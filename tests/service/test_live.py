@@ -242,3 +242,35 @@ def test_inputs_that_cannot_be_are_told(tmp_path: Path) -> None:
         run_live(station, pointer_for(station), 0.1, None)
     with pytest.raises(UserError, match="host:port"):
         Rotator("nowhere", Mount(), 0.1, 1.0)
+
+
+def test_elements_guide_by_themselves(tmp_path: Path) -> None:
+    """No radio at all: a satellite's elements steer the beam, at the elements' own epoch."""
+    from boresight.pointing.satellite import look, read_tle, unix_of
+    from tests.pointing.test_satellite import SITE as PLACE
+    from tests.pointing.test_satellite import tle
+
+    lines = "\n".join(tle("28057"))
+    (tmp_path / "sat.tle").write_text("CBERS 2\n" + lines, encoding="utf-8")
+    (tmp_path / "site.toml").write_text(
+        '[site]\nlatitude_deg = 47.45\nlongitude_deg = 8.56\nheight_m = 430.0\n[dynamics]\nkind = "orbit"\n'
+        '[[source]]\nid = "sgp4"\ntle = "sat.tle"\nsatellite = "CBERS 2"\nsigma_position_m = 1000.0\n'
+        f'[output]\nudp = "127.0.0.1:{(port := free_port())}"\n',
+        encoding="utf-8",
+    )
+    station = read_site(tmp_path / "site.toml")
+    (one,) = read_tle(lines, "x")
+    epoch = unix_of(one.record.jdsatepoch, one.record.jdsatepochF)
+    offset = epoch - time.time()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", port))
+        run_live(station, pointer_for(station), 6.0, None, clock=lambda: time.time() + offset)
+        listener.setblocking(False)
+        rows = []
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                rows.append(json.loads(listener.recv(4096)))
+    last = rows[-1]
+    azimuth, elevation, _ = look(one, [last["t_aim_s"]], PLACE)
+    assert abs(math.remainder(last["az_deg"] - math.degrees(azimuth[0]), 360.0)) < 0.3
+    assert abs(last["el_deg"] - math.degrees(elevation[0])) < 0.3

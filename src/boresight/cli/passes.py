@@ -45,7 +45,7 @@ def passes(
     Parameters
     ----------
     tle
-        File of two-line elements.
+        File of two-line elements, or of OMM messages (JSON, CSV, XML).
     site
         Latitude, longitude (deg), height (m).
     start
@@ -76,7 +76,7 @@ def passes(
     place = Site(math.radians(site[0]), math.radians(site[1]), site[2])
     machine = read_site(mount).mount if mount else Mount()
     rows: list[dict[str, Any]] = []
-    for one in orbit.read_tle(read_text(tle), str(tle)):
+    for one in orbit.read_elements(read_text(tle), str(tle)):
         begin = _time(start) if start else orbit.unix_of(one.record.jdsatepoch, one.record.jdsatepochF)
         found = orbit.passes(one, place, begin, begin + 3600 * hours, math.radians(min_elevation_deg), dut1_s)
         rows += [_row(one, p, place, machine, beam_width_deg, dut1_s) for p in found]

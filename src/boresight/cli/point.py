@@ -70,21 +70,26 @@ def point(
     from boresight.io.files import check_output, output_folder
     from boresight.io.recording import read_recording
     from boresight.io.table import write_table
+    from boresight.report.pointing import pointing_picture
+    from boresight.service.elements import Elements
     from boresight.service.replay import replay as run
 
     check_output(output, force)
     recording = read_recording(replay)
     chain = pointer_for(station, recording)
-    pointings = [p for p, _ in run(chain, recording, station.file.beam.rate_hz, station.file.platform)]
+    how = (station.file.beam.rate_hz, station.file.platform, Elements(chain, station.elements))
+    pointings = [p for p, _ in run(chain, recording, *how)]
     if not pointings:
         raise UserError(f"{replay}: no report with a range or a position: nothing to point at")
     with output_folder(output, force) as folder:
         write_table(folder / "pointing.parquet", columns(pointings))
+        rows = [row(p) for p in pointings]
+        pointing_picture(folder / "pointing.png", {name: [r[name] for r in rows] for name in (*NUMBERS, "mode")})
         _summary(folder, site, replay, pointings)
     if json:
         last = pointings[-1]
-        rows = [{"rows": len(pointings), "from_s": pointings[0].t, "to_s": last.t, "p_in_beam": last.aim.p_in_beam}]
-        print_json("point", {"site": str(site), "replay": str(replay)}, rows)
+        told = [{"rows": len(pointings), "from_s": pointings[0].t, "to_s": last.t, "p_in_beam": last.aim.p_in_beam}]
+        print_json("point", {"site": str(site), "replay": str(replay)}, told)
     else:
         print(f"wrote {output}/pointing.parquet: {len(pointings)} rows")
 

@@ -8,10 +8,12 @@ from typing import Literal, NamedTuple
 
 from boresight.errors import UserError, did_you_mean
 from boresight.frames.array_face import Pole
+from boresight.io.files import read_text
 from boresight.io.toml import TableModel, convert, read_toml
 from boresight.pointing.guide import GuideFilter, GuideSource
 from boresight.pointing.mount import Mount
 from boresight.pointing.pointer import Choice, Pointer
+from boresight.pointing.satellite import Satellite, read_elements
 from boresight.types import Component, Recording, Sensor, Site
 
 DEG = math.pi / 180.0
@@ -63,7 +65,7 @@ class DynamicsTable(TableModel, frozen=True):
 
 
 class SourceTable(TableModel, frozen=True):
-    """`[[source]]`: a guide source or own tracking; live ones say where they are heard."""
+    """`[[source]]`: a guide source or own tracking; with `tle` (a file beside this one) an orbit's elements."""
 
     id: str
     own: bool = False
@@ -72,6 +74,8 @@ class SourceTable(TableModel, frozen=True):
     sigma_position_m: float = 0.0
     sigma_bias_m: float = 0.0
     offset_enu_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tle: str | None = None
+    satellite: str | None = None
 
 
 class InputTable(TableModel, frozen=True):
@@ -115,6 +119,7 @@ class Station(NamedTuple):
     file: SiteFile
     site: Site
     mount: Mount
+    elements: dict[str, Satellite]  # by source id
 
 
 def read_site(path: Path) -> Station:
@@ -129,7 +134,18 @@ def read_site(path: Path) -> Station:
         (m.azimuth_deg[0] * DEG, m.azimuth_deg[1] * DEG), (m.elevation_deg[0] * DEG, m.elevation_deg[1] * DEG),
         m.azimuth_rate_deg_s * DEG, m.elevation_rate_deg_s * DEG, tuple((a * DEG, e * DEG) for a, e in m.horizon_deg),
     )  # fmt: skip
-    return Station(file, Site(s.latitude_deg * DEG, s.longitude_deg * DEG, s.height_m), mount)
+    elements = {one.id: _satellite(one, path) for one in file.source if one.tle is not None}
+    return Station(file, Site(s.latitude_deg * DEG, s.longitude_deg * DEG, s.height_m), mount, elements)
+
+
+def _satellite(source: SourceTable, path: Path) -> Satellite:
+    where = path.parent / str(source.tle)
+    known = {one.name: one for one in read_elements(read_text(where), str(where))}
+    if source.satellite is None:
+        return next(iter(known.values()))
+    if source.satellite not in known:
+        raise UserError(f"{where}: no satellite '{source.satellite}'{did_you_mean(source.satellite, known)}")
+    return known[source.satellite]
 
 
 def pointer_for(station: Station, recording: Recording | None = None) -> Pointer:
@@ -145,9 +161,10 @@ def pointer_for(station: Station, recording: Recording | None = None) -> Pointer
     else:
         known = [s.id for s in recording.sensors]
         for name in named:
-            if name not in known:
+            if name not in known and name not in station.elements:
                 raise UserError(f"source '{name}' is not in the recording{did_you_mean(name, known)}")
         sources = [_source(named[s.id]) if s.id in named else _declared(s) for s in recording.sensors]
+        sources += [_source(s) for s in file.source if s.id in station.elements and s.id not in known]
     if not sources:
         raise UserError("the site file has no [[source]]: say who reports")
     orbit = file.dynamics.kind == "orbit"

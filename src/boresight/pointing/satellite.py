@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import io
+import json
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -70,6 +72,44 @@ def read_tle(text: str, where: str) -> list[Satellite]:
     if not out:
         raise UserError(f"{where}: no two-line elements in it")
     return out
+
+
+def read_omm(text: str, where: str) -> list[Satellite]:
+    """Return the satellites of orbit mean-elements messages: JSON (a list of objects), CSV or XML.
+
+    Raises UserError for a message that lacks an element, and for none at all; `where` is named in it.
+    """
+    try:
+        omm, api = importlib.import_module("sgp4.omm"), importlib.import_module("sgp4.api")
+    except ImportError:
+        raise UserError("orbital elements need the package sgp4: it is missing here") from None
+    start = text.lstrip()[:1]
+    try:
+        if start in "[{":
+            found = json.loads(text)
+            messages = found if isinstance(found, list) else [found]
+        elif start == "<":
+            messages = list(omm.parse_xml(io.StringIO(text)))
+        else:
+            messages = list(omm.parse_csv(io.StringIO(text)))
+        out = []
+        for message in messages:
+            record = api.Satrec()
+            omm.initialize(record, {k: str(v) for k, v in message.items()})
+            out.append(Satellite(str(message.get("OBJECT_NAME", record.satnum)), record))
+    except (KeyError, ValueError, SyntaxError, TypeError, AttributeError) as error:
+        raise UserError(f"{where}: not orbit mean elements ({type(error).__name__}: {error})") from None
+    if not out:
+        raise UserError(f"{where}: no orbit mean elements in it")
+    return out
+
+
+def read_elements(text: str, where: str) -> list[Satellite]:
+    """Return the satellites of two-line elements or OMM messages, whichever the text holds."""
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    if first.lstrip()[:1] in "[{<" or "MEAN_MOTION" in first:
+        return read_omm(text, where)
+    return read_tle(text, where)
 
 
 def ecef_at(satellite: Satellite, t: ArrayLike, dut1: float = 0.0) -> FloatArray:

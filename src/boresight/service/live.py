@@ -14,6 +14,7 @@ import msgspec
 from boresight.config.site import Station
 from boresight.errors import UserError
 from boresight.pointing.pointer import Pointer, PointerState, Pointing
+from boresight.service.elements import Elements
 from boresight.service.feed import PER_TICK, Feed, origins
 from boresight.service.rotctld import Rotator
 from boresight.service.sockets import Broadcast, Input, Serial, Tcp, Udp, address
@@ -44,6 +45,7 @@ def run_live(
     if file.output.rotctld:
         band, period = math.radians(file.output.dead_band_deg), 1.0 / file.output.command_rate_hz
         rotator = Rotator(file.output.rotctld, station.mount, band, period)
+    elements = Elements(pointer, station.elements)
     state, begun = _warm(pointer), clock()
     tick, ticks, latency, busy = begun, 0, 0.0, time.process_time()
     arrived = math.nan
@@ -58,6 +60,7 @@ def run_live(
             if now < tick:
                 _wait(inputs, tick - now)
                 continue
+            elements.report(state, now)
             state, pointing = pointer.tick(state, now)
             if pointing is not None:
                 if out is not None:
@@ -127,7 +130,7 @@ def _inputs(station: Station) -> list[Input]:
         inputs.append(Tcp(wanted.tcp, PER_TICK))
     if wanted.serial:
         inputs.append(Serial(wanted.serial, wanted.baud, PER_TICK))
-    if not inputs:
+    if not inputs and not station.elements:
         raise UserError("the site file has no [input]: give udp, tcp or serial, or use --replay")
     return inputs
 

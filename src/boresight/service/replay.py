@@ -14,6 +14,7 @@ from boresight.frames.pose import PoseTrack, pose_track, sensor_pose
 from boresight.io.scans import iter_scans
 from boresight.kernels.guide import DIRECTION
 from boresight.pointing.pointer import Place, Pointer, PointerState, Pointing
+from boresight.service.elements import Elements
 from boresight.types import Component, FloatArray, Recording, Scan
 
 FRD_FROM_RFU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -21,7 +22,11 @@ POSITION = slice(Component.EAST, Component.UP + 1)
 
 
 def replay(
-    pointer: Pointer, recording: Recording, rate: float, platform: str | None = None
+    pointer: Pointer,
+    recording: Recording,
+    rate: float,
+    platform: str | None = None,
+    elements: Elements | None = None,
 ) -> Iterator[tuple[Pointing, PointerState]]:
     """Yield a command at every tick of `rate` (Hz), from what had arrived by then; live and replay are one chain.
 
@@ -38,6 +43,8 @@ def replay(
     k, tick = 0, float(first)
     for scan in iter_scans(recording):
         while tick < scan.t_recv:
+            if elements is not None:
+                elements.report(state, tick)
             state, out = pointer.tick(state, tick, _place(pointer, carrier, tick))
             if out is not None:
                 yield out, state
