@@ -17,7 +17,7 @@ from boresight.metrics.score import score
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
 from boresight.tracking.saved import arrays_of_state, snapshot, state_of_arrays
-from boresight.types import FATES, Detections, Fate, Recording, TrackRows
+from boresight.types import FATES, Detections, Fate, Recording, Sensor, SensorKind, Site, TrackRows
 from tests.tracking.conftest import make_recording
 
 CONFIG = TrackerConfig(q=0.01)
@@ -223,3 +223,33 @@ def test_empty_looks_count_only_where_the_sensor_could_have_seen_the_target(harb
         existence.append(float(target.max()) if len(target) else 0.0)
     assert existence[0] < 0.3  # thirty seconds of looks that saw nothing
     assert existence[1] > 0.7  # nobody looked there
+
+
+def test_a_sensor_that_declares_no_range_still_tracks_in_three_dimensions() -> None:
+    t = np.arange(40.0)
+    sigma = np.full(7, np.nan)
+    sigma[4:] = 5.0
+    z = np.full((40, 7), np.nan)
+    z[:, 4:] = np.column_stack([100 + 5 * t, 200 - 3 * t, 50 + t]) + np.random.default_rng(2).normal(0, 5.0, (40, 3))
+    rows = Detections(t, t, np.zeros(40, np.int64), np.arange(40), z, np.where(np.isfinite(z), 5.0, np.nan), {})
+    sensor = Sensor("gps", SensorKind.POSITION, sigma=sigma)
+    recording = Recording("one", 3, Site(1.0, 0.1, 0.0), (sensor,), rows, duplicates=np.zeros(40, dtype=bool))
+    found = tracked(recording, config=TrackerConfig())
+    assert len(np.unique(found.track_id)) == 1
+    assert found.t.min() < 12.0
+    last = found.t == found.t.max()
+    np.testing.assert_allclose(found.position[last][-1], [100 + 5 * 39, 200 - 3 * 39, 50 + 39], atol=15.0)
+
+
+def test_tracks_fade_in_a_long_silence(harbour: Recording) -> None:
+    d = harbour.detections
+    after = d.t > 30.0
+    late = dataclasses.replace(d, t=d.t + 3600.0 * after, t_recv=d.t_recv + 3600.0 * after)
+    nav = harbour.platforms[0]
+    silent = dataclasses.replace(
+        harbour, detections=late, platforms=(dataclasses.replace(nav, t=nav.t + 3600.0 * (nav.t > 30.0)),)
+    )
+    rows = tracked(silent)
+    in_gap = (rows.t > 31.0) & (rows.t < 3600.0)
+    assert in_gap.sum() > 0  # predicted on for a while …
+    assert rows.t[in_gap].max() < 300.0  # … and then given up: nobody knows after minutes

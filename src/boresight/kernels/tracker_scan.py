@@ -51,7 +51,9 @@ def azimuth_bin(azimuth: float) -> int:
 def clutter_density(tr: Tracks, s: Settings, sensor: SensorTable, z: FloatArray, mask: IntArray, m: int) -> float:
     """Expected false detections per unit volume of the measured components around `z`, as learned so far."""
     known = tr.clutter[sensor.number]
-    high = sensor.range_high if math.isfinite(sensor.range_high) else max(tr.seen_range[sensor.number], 100.0)
+    high = sensor.range_high
+    if not math.isfinite(high):  # nothing declared: twice what was seen, at least 100 s at the prior speed
+        high = max(2.0 * tr.seen_range[sensor.number], 100.0 * s.speed_sigma)
     volume = volume_of(mask, m, sensor, high, s.d, s.speed_sigma)
     if sensor.ranging:
         return float(known[AZIMUTH_BINS] / volume)
@@ -488,8 +490,9 @@ def learn_clutter(
     floor = 0.05 * sensor.clutter_per_scan
     for k in range(m):
         i = row_of_col[k]
-        if math.isfinite(look.z[k, 0]):
-            tr.seen_range[sensor.number] = max(tr.seen_range[sensor.number], look.z[k, 0])
+        far = look.z[k, 0] if math.isfinite(look.z[k, 0]) else math.hypot(look.z[k, 4], look.z[k, 5])
+        if far > tr.seen_range[sensor.number]:
+            tr.seen_range[sensor.number] = far
         if not usable[k]:
             continue
         share = 1.0

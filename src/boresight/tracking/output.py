@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from boresight.kernels.tracker import Tracks
+from boresight.kernels.tracker import HIDDEN, VISIBLE, Tracks
 from boresight.tracking.core import Plan
 from boresight.types import FloatArray
 
@@ -86,13 +87,15 @@ class Rows:
 
 
 def rows_at(tr: Tracks, plan: Plan, t: float, t_known: float, coast_after: float) -> Rows | None:
-    """Predict the shown tracks to time `t` (s); None where there is none."""
+    """Predict the shown tracks to time `t` (s), those that are still probable then; None where there is none."""
     n = int(tr.live[0])
-    shown = np.nonzero(tr.life[:n, 2] > 0.0)[0]
-    if len(shown) == 0:
-        return None
     d = plan.settings.d
     dt = max(0.0, t - float(tr.time[0]))
+    survive = math.exp(-dt / plan.settings.survival_time)
+    target = survive * (tr.weight[:n, VISIBLE] + tr.weight[:n, HIDDEN])
+    shown = np.nonzero((tr.life[:n, 2] > 0.0) & (target >= plan.settings.hide_below))[0]
+    if len(shown) == 0:
+        return None
     x, P = tr.x[shown], tr.P[shown]
     pos, vel = slice(0, d), slice(d, 2 * d)
     cross = P[:, pos, vel]
