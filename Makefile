@@ -51,3 +51,4 @@ lock: ## pin the dependencies again (needs uv)
 
 clean: ## remove the environment and everything made
 	rm -rf $(VENV) demo .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find src tests benchmarks -name __pycache__ -prune -exec rm -rf {} +

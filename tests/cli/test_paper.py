@@ -57,6 +57,16 @@ def test_mistakes_end_with_one_line(arguments: tuple[str, ...], message: str) ->
     assert not done.stdout
 
 
+def test_async_ekf_plot(tmp_path: Path) -> None:
+    picture = tmp_path / "a.png"
+    done = boresight("paper", "async_ekf", "--scenario", "S2", "--runs", "1", "--plot", str(picture))
+    assert done.returncode == 0, done.stderr
+    assert picture.stat().st_size > 10_000
+    done = boresight("paper", "async_ekf", "--runs", "1", "--plot", str(picture))
+    assert done.returncode == 2
+    assert "give --scenario S0 or S2" in done.stderr
+
+
 def test_async_ekf_json() -> None:
     done = boresight("paper", "async_ekf", "--runs", "1", "--json")
     assert done.returncode == 0, done.stderr

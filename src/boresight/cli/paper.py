@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from pathlib import Path
 
 from cyclopts import App
+
+from boresight.errors import UserError
 
 app = App(name="paper", help="Print a paper's table: as printed, corrected, and ours.", help_format="plaintext")
 
@@ -27,3 +31,18 @@ def say(what: str) -> None:
 
 
 LOADING = "loading kernels (the first run compiles them, about half a minute)"
+
+
+def write_image(path: Path, draw: Callable[[Path], None]) -> None:
+    """Draw to a temporary name, then rename; raises UserError for an unknown suffix or a folder that is not there."""
+    kinds = (".svg", ".png", ".pdf")
+    if path.suffix not in kinds:
+        raise UserError(f"--plot {path}: the file must end in {', '.join(kinds)}")
+    if not path.absolute().parent.is_dir():
+        raise UserError(f"--plot {path}: there is no folder {path.parent}")
+    part = path.with_name(f".part{path.suffix}")
+    try:
+        draw(part)
+        part.replace(path)
+    except OSError as error:
+        raise UserError(f"--plot {path}: cannot be written ({(error.strerror or str(error)).lower()})") from None

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from boresight.cli.output import print_json, print_table
-from boresight.cli.paper import LOADING, say
+from boresight.cli.paper import LOADING, say, write_image
 from boresight.errors import UserError, did_you_mean
 
 COLUMNS = {
@@ -17,7 +19,9 @@ COLUMNS = {
 }
 
 
-def async_ekf(*, scenario: str = "all", runs: int = 500, seed: int = 1, json: bool = False) -> None:
+def async_ekf(
+    *, scenario: str = "all", runs: int = 500, seed: int = 1, plot: Path | None = None, json: bool = False
+) -> None:
     """Print async_ekf's table: the listing, its mistakes mended in turn, and filters at the data's own times.
 
     Parameters
@@ -29,6 +33,8 @@ def async_ekf(*, scenario: str = "all", runs: int = 500, seed: int = 1, json: bo
         Monte Carlo runs of each scenario.
     seed
         Of the random numbers.
+    plot
+        Image file (.svg, .png, .pdf) to write with the errors over time; for S0 or S2, which --scenario must name.
     json
         Print one JSON object instead of a table.
     """
@@ -45,6 +51,8 @@ def async_ekf(*, scenario: str = "all", runs: int = 500, seed: int = 1, json: bo
         )
     if runs < 1:
         raise UserError(f"--runs must be at least 1, not {runs}")
+    if plot is not None:
+        _plot(plot, scenario, runs, seed)
     rows = []
     for name in names:
         say(f"scenario {name}")
@@ -53,3 +61,12 @@ def async_ekf(*, scenario: str = "all", runs: int = 500, seed: int = 1, json: bo
         print_json("paper async_ekf", {"scenario": scenario, "runs": runs, "seed": seed}, rows)
         return
     print_table(COLUMNS, rows, f"async_ekf, {runs} runs, seed {seed}", digits=3)
+
+
+def _plot(path: Path, name: str, runs: int, seed: int) -> None:
+    from boresight.papers.async_ekf.plot import plot
+    from boresight.papers.async_ekf.scenario import SCENARIOS
+
+    if name not in SCENARIOS:
+        raise UserError(f"--plot shows one scenario: give --scenario {' or '.join(SCENARIOS)}")
+    write_image(path, lambda part: plot(part, name, runs, seed))

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from boresight.cli.output import print_json, print_table
-from boresight.cli.paper import LOADING, say
+from boresight.cli.paper import LOADING, say, write_image
 from boresight.errors import UserError, did_you_mean
 
 COLUMNS = {  # the ratio in elevation is left to --json: 80 columns
@@ -100,12 +100,4 @@ def _plot(path: Path, name: str, runs: int, seed: int) -> None:
 
     if name not in SETS:
         raise UserError(f"--plot shows the sets {', '.join(SETS)}, not '{name}'")
-    kinds = (".svg", ".png", ".pdf")
-    if path.suffix not in kinds:
-        raise UserError(f"--plot {path}: the file must end in {', '.join(kinds)}")
-    part = path.with_name(f".part{path.suffix}")
-    try:
-        plot(part, name, runs, seed)
-        part.replace(path)
-    except OSError as error:
-        raise UserError(f"--plot {path}: cannot be written ({(error.strerror or str(error)).lower()})") from None
+    write_image(path, lambda part: plot(part, name, runs, seed))

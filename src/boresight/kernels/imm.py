@@ -5,6 +5,7 @@ name each component, so that components of one name are mixed with each other. A
 part with the mixing model's own belief of it (Yuan, Bar-Shalom, Willett 2012: unbiased mixing).
 """
 
+# Numba caches by file and compiles kernels.gaussian into these: clear __pycache__ (make clean) when that changes.
 from __future__ import annotations
 
 import math

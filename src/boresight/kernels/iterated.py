@@ -1,5 +1,6 @@
 """The iterated EKF's update: Gauss-Newton on the posterior, with step control."""
 
+# Numba caches by file and compiles kernels.gaussian into these: clear __pycache__ (make clean) when that changes.
 from __future__ import annotations
 
 from typing import Any

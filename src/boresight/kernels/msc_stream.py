@@ -1,5 +1,6 @@
 """The MSC filter: one cycle, and a whole stream in one call."""
 
+# Numba caches by file and compiles kernels.gaussian into these: clear __pycache__ (make clean) when that changes.
 from __future__ import annotations
 
 from typing import Any

@@ -1,5 +1,6 @@
 """One prediction or update of the EKF with the built-in models in one call: what a loop over reports pays for."""
 
+# Numba caches by file and compiles kernels.gaussian into these: clear __pycache__ (make clean) when that changes.
 from __future__ import annotations
 
 import numpy as np

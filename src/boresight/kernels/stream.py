@@ -1,5 +1,6 @@
 """Whole streams in one call: extended Kalman filter, Cramér-Rao bound, over any motion and observation kernels."""
 
+# Numba caches by file and compiles kernels.gaussian into these: clear __pycache__ (make clean) when that changes.
 from __future__ import annotations
 
 from typing import Any

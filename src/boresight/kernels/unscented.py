@@ -4,6 +4,7 @@ Points go through the function; the slope A and the residual covariance Ω that 
 Jacobian, so that prediction and update are the same symmetric, Joseph-form code as the EKF's.
 """
 
+# Numba caches by file and compiles kernels.gaussian into these: clear __pycache__ (make clean) when that changes.
 from __future__ import annotations
 
 import math

@@ -153,3 +153,19 @@ def table(name: str, runs: int, seed: int, methods: tuple[str, ...] = tuple(METH
             }
         )
     return rows
+
+
+SHOWN = ("interpolated", "radar_only", "cv", "ca", "imm", "adaptive_q", "adaptive_r", "rts_ca")
+
+
+def over_time(
+    name: str, runs: int, seed: int, methods: tuple[str, ...] = SHOWN
+) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Return the radar's times (e,) from first to last and, per method, RMS position and velocity errors (2, e)."""
+    data = simulate(SCENARIOS[name], runs, np.random.default_rng(seed))
+    data = data._replace(at=np.flatnonzero(data.is_radar))
+    curves = {}
+    for method in methods:
+        e = np.array([METHODS[method](data, run).x[:, :6] for run in range(runs)]) - data.truth[:, data.at]
+        curves[method] = np.sqrt(np.mean([(e[..., :3] ** 2).sum(-1), (e[..., 3:] ** 2).sum(-1)], axis=1))
+    return data.t[data.at], curves
