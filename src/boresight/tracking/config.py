@@ -52,7 +52,9 @@ class TrackerConfig:
     lonely_bearings: bool = True
     clutter_memory: float = 30.0  # looks
     coast_after: float = 4.0  # s without a hit after which a shown track counts as coasting
-    window: float | None = None  # s, how late a report may be (None: the largest declared latency + 1 s)
+    window: float | None = (
+        None  # s, how late a report may be (None: spread of the declared latencies + half the longest period + 1 s)
+    )
     sensors: dict[str, SensorErrors] = field(default_factory=dict)  # by sensor id
 
     def __post_init__(self) -> None:

@@ -87,7 +87,9 @@ class Tracker:
         latencies = [self.sensors[i].latency for i in used] or [0.0]
         length = self.config.window
         if length is None:
-            length = max(latencies) - min(latencies) + 1.0
+            # a look that sweeps one period arrives half of it after its middle
+            sweep = 0.5 * max((self.sensors[i].period or 0.0 for i in used), default=0.0)
+            length = max(latencies) - min(latencies) + sweep + 1.0
         object.__setattr__(self, "length", length)
 
     @property
