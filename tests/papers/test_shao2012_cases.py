@@ -20,7 +20,8 @@ def test_cases(runs: int) -> None:
     weave = rows("weave", runs)
     # range errors grow with the square of range, which differs by a factor of two between runs: one run in 500 with a
     # target three sigma away can rule an RMS, so each error is also taken by that run's own bound
-    assert weave["msc", 5.0]["range_bound_m"] < 50.0
+    # the bound itself, averaged over the runs: 50 m give or take 3 % over 300
+    assert weave["msc", 5.0]["range_bound_m"] < 52.0 * slack
     for at, most in ((5.0, 55.0), (8.0, 18.0)):
         assert weave["msc", at]["range_m"] < most * slack
         assert weave["msc", at]["range_over_bound"] < 1.05 * slack
