@@ -22,7 +22,7 @@ DIRECTION, POSITION = 0, 1  # what a report holds: azimuth, elevation, range (Na
 ORBIT, ACCELERATION = 0, 1  # dynamics
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def gravity(x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return the acceleration (m/s²) of two bodies and the oblateness (J2) at an inertial position (m)."""
     r2 = x * x + y * y + z * z
@@ -33,7 +33,7 @@ def gravity(x: float, y: float, z: float) -> tuple[float, float, float]:
     return k * x * (1.0 + j * (1.0 - s)), k * y * (1.0 + j * (1.0 - s)), k * z * (1.0 + j * (3.0 - s))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def fly(x: FloatArray, dt: float) -> None:
     """Advance position and velocity (6,) on their orbit by `dt` (s, either sign), in place: Runge–Kutta 4."""
     steps = max(1, math.ceil(abs(dt) / LONGEST))
@@ -57,13 +57,15 @@ def fly(x: FloatArray, dt: float) -> None:
         x[5] = v2 + w * (a2 + 2.0 * (b2 + c2) + d2)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def advance(x: FloatArray, dynamics: int, dt: float, F: FloatArray) -> None:
     """Advance a state in place by `dt` (s) and fill `F` (m, m), m = 6 or 9, with its transition."""
     F[:] = 0.0
     h2 = 0.5 * dt * dt
     for i in range(len(F)):
         F[i, i] = 1.0
+    if dt == 0.0:
+        return
     if dynamics == ACCELERATION:
         for i in range(3):
             F[i, 3 + i] = F[3 + i, 6 + i] = dt
@@ -93,7 +95,7 @@ def noise(dynamics: int, q: float, dt: float, i: int, j: int) -> float:
     return q * dt**n / (n * (2.0 if i == 0 else 1.0) * (2.0 if j == 0 else 1.0))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def predict(x: FloatArray, P: FloatArray, dynamics: int, q: float, dt: float, F: FloatArray, W: FloatArray) -> None:
     """Advance state (n,) and covariance (n, n) in place by `dt` >= 0; `F` (m, m) and `W` (m, n) are work space."""
     m, n = len(F), len(x)
@@ -118,7 +120,7 @@ def predict(x: FloatArray, P: FloatArray, dynamics: int, q: float, dt: float, F:
                 P[3 * i + axis, 3 * j + axis] += noise(dynamics, q, dt, i, j)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def motion_axes(x: FloatArray, B: FloatArray) -> None:
     """Fill `B` (3, 3) with columns along, across and up of the motion."""
     r = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
@@ -140,7 +142,7 @@ def spin(t: float, a: FloatArray, out: FloatArray) -> None:
     out[0], out[1], out[2] = c * a[0] - s * a[1], s * a[0] + c * a[1], a[2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def compare(
     p: FloatArray, kind: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray,
     y: FloatArray, A: FloatArray, s: FloatArray, u: FloatArray,

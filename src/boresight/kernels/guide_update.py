@@ -24,7 +24,7 @@ def work_space(n: int) -> Work:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def update(
     x: FloatArray, P: FloatArray, lag: float, biased: bool, dynamics: int, q: float, kind: int, t: float,
     z: FloatArray, origin: FloatArray, axes: FloatArray, R: FloatArray, gate: float, work: Work,
@@ -86,7 +86,7 @@ def update(
     return nis, log_likelihood, k, share
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def _whiten(S: FloatArray, y: FloatArray, G: FloatArray, k: int) -> tuple[float, float]:
     """Turn `y` to L⁻¹ y and `G` to G L⁻ᵀ in place, S = L L'; return y'S⁻¹y and log det S."""
     log_det, nis = 0.0, 0.0
