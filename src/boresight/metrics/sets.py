@@ -27,6 +27,10 @@ def gospa(targets: FloatArray, tracks: FloatArray, c: float = 20.0, p: float = 2
     """Return the generalised OSPA distance (alpha = 2) of tracks (m, d) to targets (n, d) in metres.
 
     Every missed target and every false track costs c**p / 2 (Rahmathullah, García-Fernández, Svensson 2017, eq. 1).
+
+    >>> two, one = np.array([[0.0, 0.0], [100.0, 0.0]]), np.array([[3.0, 4.0]])
+    >>> gospa(two, one).missed, gospa(two, one).localisation
+    (200.0, 25.0)
     """
     pairs = match(targets, tracks, c, p)
     localisation = float(sum(math.dist(targets[i], tracks[j]) ** p for i, j in pairs))
