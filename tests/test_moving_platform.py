@@ -31,7 +31,7 @@ height_m = 430.0
 id = "plane"
 kind = "waypoints"
 attitude = { pitch_deg = 3.0, sway_ypr_deg = [0.0, 3.0, 30.0], sway_period_s = [10.0, 6.5, 9.0] }
-navigation = { rate_hz = 50.0 }
+navigation = { rate_hz = 10.0 }
 [platforms.path]
 points_enu_m = [[-6000.0, -9000.0, 3000.0], [-4500.0, -5000.0, 3100.0],
   [-4500.0, 0.0, 3000.0], [-7000.0, 4300.0, 3050.0]]
@@ -50,6 +50,7 @@ id = "radar"
 kind = "radar"
 {place}
 period_s = 1.0
+start_s = 0.193
 sigma_range_m = 15.0
 sigma_azimuth_deg = 0.3
 sigma_elevation_deg = 0.3
@@ -61,6 +62,7 @@ id = "camera"
 kind = "infrared"
 {place}
 period_s = 0.2
+start_s = 0.097
 sigma_azimuth_deg = 0.1
 sigma_elevation_deg = 0.1
 p_detection = 0.9

@@ -16,6 +16,11 @@ _geodetic_from_ecef = geodesy.geodetic_from_ecef
 _ecef_from_enu_rotation = geodesy.ecef_from_enu_rotation
 _fill_rotation = geodesy.fill_ecef_from_enu
 _fill_matrix = rotation.fill_matrix
+_step_between = rotation.step_between
+_multiply = rotation.multiply
+_from_rotation_vector = rotation.quaternion_from_rotation_vector
+
+FIT_SPAN = 1.0  # s that the last four attitude stamps may span for their curve to be worth following
 
 
 @njit(cache=True)
@@ -71,11 +76,17 @@ def interpolate_attitude(
 ) -> tuple[FloatArray, FloatArray]:
     """Return rotations (n, 3, 3) and body rates (n, 3) (rad/s, in body axes) at `t` by slerp.
 
-    `steps` (m - 1, 3) are the rotation vectors between the nodes. Beyond the ends the last turning goes on.
+    `steps` (m - 1, 3) are the rotation vectors between the nodes. Before the first and after
+    the last node the turning goes on, after it with the change of rate that the last four stamps show.
     """
     R = np.empty((len(t), 3, 3))
     rate = np.zeros((len(t), 3))
+    last = len(nodes) - 1
+    steady = last >= 3 and nodes[last] - nodes[last - 3] <= FIT_SPAN
     for k in range(len(t)):
+        if steady and t[k] > nodes[last]:
+            _foretell(nodes[last - 3 :], quaternion[last - 3 :], t[k], R[k], rate[k])
+            continue
         i = segment(nodes, t[k])
         w, x, y, z = quaternion[i, 0], quaternion[i, 1], quaternion[i, 2], quaternion[i, 3]
         if len(nodes) > 1:
@@ -91,6 +102,46 @@ def interpolate_attitude(
             )
         _fill_matrix(w, x, y, z, R[k])
     return R, rate
+
+
+@njit(cache=True)
+def _foretell(nodes: FloatArray, quaternion: FloatArray, t: float, R: FloatArray, rate: FloatArray) -> None:
+    """Fill `R` and `rate` at `t` after the last of four stamps: a quadratic of the turns by least squares.
+
+    A rolling platform's rate changes: to go on with the last one is wrong by half the angular acceleration times the
+    age squared (0.07° at 30° of roll in 9 s and 10 Hz, more than a sensor's sigma). Beyond one and a half stamps the
+    rate goes on as it is there.
+    """
+    h = nodes[3] - nodes[0]
+    s0, s1, s2, s3, s4 = 4.0, 0.0, 0.0, 0.0, 0.0
+    b = np.zeros((3, 3))
+    for i in range(4):
+        s = (nodes[i] - nodes[3]) / h
+        v = _step_between(quaternion[3], quaternion[i])
+        s1 += s
+        s2 += s * s
+        s3 += s * s * s
+        s4 += s * s * s * s
+        for j in range(3):
+            b[0, j] += v[j]
+            b[1, j] += s * v[j]
+            b[2, j] += s * s * v[j]
+    # the inverse of [[s0, s1, s2], [s1, s2, s3], [s2, s3, s4]] by its cofactors
+    a, e, f = s2 * s4 - s3 * s3, s2 * s3 - s1 * s4, s1 * s3 - s2 * s2
+    g, m, n = s0 * s4 - s2 * s2, s1 * s2 - s0 * s3, s0 * s2 - s1 * s1
+    det = s0 * a + s1 * e + s2 * f
+    far = (t - nodes[3]) / h
+    near = min(far, 1.5 * (nodes[3] - nodes[2]) / h)
+    v = np.empty(3)
+    for j in range(3):
+        c0 = (a * b[0, j] + e * b[1, j] + f * b[2, j]) / det
+        c1 = (e * b[0, j] + g * b[1, j] + m * b[2, j]) / det
+        c2 = (f * b[0, j] + m * b[1, j] + n * b[2, j]) / det
+        slope = c1 + 2.0 * c2 * near
+        v[j] = c0 + near * (c1 + c2 * near) + slope * (far - near)
+        rate[j] = slope / h
+    q = _multiply(quaternion[3], _from_rotation_vector(v))
+    _fill_matrix(q[0], q[1], q[2], q[3], R)
 
 
 @njit(cache=True)
