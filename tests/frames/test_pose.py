@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
+from boresight.align.smooth import polynomial_weights
 from boresight.errors import UserError
 from boresight.frames import attitude, local
-from boresight.frames.pose import pose_track, sensor_pose
+from boresight.frames.pose import add_navigation_noise, pose_track, sensor_pose
 from boresight.kernels.measurement import measure
 from boresight.types import Axes, Mount, PlatformTrack, Sensor, SensorKind, Site
 
@@ -192,3 +193,23 @@ def test_a_rolling_platform_is_foretold_by_its_change_of_rate() -> None:
     rate = track.until(5.0).body_rate(5.05)[0]
     true = np.radians(30.0) * 2 * np.pi / 9.0 * np.cos(2 * np.pi * 5.05 / 9.0)
     assert rate[0] == pytest.approx(true, abs=np.radians(0.8))
+
+
+def test_the_error_of_navigation_enters_the_measurements() -> None:
+    """Attitude noise of 1 mrad and 3 m of position, at 1000 m: in angles √(1² + 3²) mrad, in range 3 m."""
+    declared = np.full(len(T), 1e-3)
+    track = pose_track(replace(platform(), sigma_attitude=declared, sigma_position=np.full(len(T), 3.0)))
+    z = np.array([[1000.0, 0.2, np.pi / 3, np.nan, np.nan, np.nan, np.nan]])
+    R = np.full((1, 7, 7), np.nan)
+    R[0, :3, :3] = np.diag([25.0, 1e-6, 1e-6])
+    between, beyond = np.array([5.05]), np.array([T[-1] + 0.1])
+    out = add_navigation_noise(sensor(Axes.BODY), track, between, z, R)
+    np.testing.assert_allclose(np.diag(out[0])[:3], [25.0 + 9.0, 1e-6 + 4 * 1e-5, 1e-6 + 1e-5])
+    out = add_navigation_noise(sensor(Axes.BODY), track, beyond, z, R)
+    assert out[0, 2, 2] == pytest.approx(1e-6 + 9e-6 + 1e-6 * 2.8**2)
+    level = add_navigation_noise(sensor(Axes.PLATFORM_ENU), track, between, z, R)
+    assert level[0, 2, 2] == pytest.approx(1e-6 + 9e-6)  # north-aligned axes do not turn with the body
+    assert add_navigation_noise(sensor(Axes.BODY), pose_track(platform()), between, z, R) is R
+    # what is said of foretelling: four stamps, quadratic, one ahead
+    w = polynomial_weights(np.arange(4.0), [4.0], 2)[0]
+    assert np.sqrt(w @ w) == pytest.approx(2.8, abs=0.02)

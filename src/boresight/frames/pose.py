@@ -12,9 +12,10 @@ from boresight.errors import UserError
 from boresight.frames.local import ENU_FROM_NED
 from boresight.kernels import pose as kernel
 from boresight.kernels import rotation, rotations
-from boresight.types import Axes, PlatformTrack, Pose, Sensor, Site
+from boresight.types import Axes, Component, PlatformTrack, Pose, Sensor, Site
 from boresight.types.sensor import FloatArray
 
+FORETOLD = 2.8  # noise of a pose one stamp ahead against that of a stamp: √7.75, a quadratic over four stamps
 SLOPE_WINDOW = 1.0  # s to either side over which a missing velocity is fitted
 _NORTH_LEVEL: FloatArray = ENU_FROM_NED.copy()  # heading north, level: FRD is NED
 
@@ -31,6 +32,7 @@ class PoseTrack:
             `steps` (m - 1, 3) the turn from each to the next (rad, body axes).
         max_extrapolation: how far before the first and after the last stamp an answer is given (s).
         max_gap: the longest time between stamps over which an answer is given (s).
+        sigma_position, sigma_attitude: declared errors of one stamp (m per axis, rad per angle); 0 if none are.
         site: set if local level turns with the platform's place on the ellipsoid; None for a flat world.
     """
 
@@ -46,6 +48,8 @@ class PoseTrack:
     max_extrapolation: float
     max_gap: float
     site: Site | None
+    sigma_position: float = 0.0
+    sigma_attitude: float = 0.0
 
     @property
     def has_attitude(self) -> bool:
@@ -168,6 +172,7 @@ def pose_track(
     return PoseTrack(
         platform.id, t, position, velocity, measured, measured[1:] & measured[:-1], t_attitude, quaternion,
         rotations.steps_between(quaternion), max_extrapolation, max_gap, site,
+        _typical(platform.sigma_position), _typical(platform.sigma_attitude),
     )  # fmt: skip
 
 
@@ -211,6 +216,40 @@ def sensor_pose(sensor: Sensor, track: PoseTrack | None, t: ArrayLike) -> tuple[
     if arm.any():
         kernel.add_lever_arm(position, velocity, R, rate, arm)
     return position, velocity, axes
+
+
+def add_navigation_noise(
+    sensor: Sensor, track: PoseTrack, t: FloatArray, z: FloatArray, covariance: FloatArray
+) -> FloatArray:
+    """Return the covariance (n, 7, 7) of measurements `z` (n, 7) with the error of the platform's pose in it.
+
+    Position error counts fully in range and Cartesian components and by the range in angles; attitude error in the
+    angles, and by the distance in Cartesian components, for sensors that turn with the body. A pose beyond the last
+    stamp carries the noise of its extrapolation. Without declared errors the covariance comes back as it is.
+    """
+    turns = sensor.axes not in (Axes.SITE_ENU, Axes.PLATFORM_ENU)
+    a = track.sigma_attitude if turns else 0.0
+    p = track.sigma_position if sensor.axes != Axes.SITE_ENU else 0.0
+    if not len(t) or (a == 0.0 and p == 0.0):
+        return covariance
+    ahead = track.has_attitude and bool(t[-1] > track.t_attitude[-1])
+    angle2 = (a * (FORETOLD if ahead else 1.0)) ** 2
+    far = np.where(np.isnan(z[:, Component.RANGE]), np.inf, z[:, Component.RANGE])
+    across = angle2 + (p / np.maximum(far, 1.0)) ** 2
+    level = np.maximum(np.cos(np.nan_to_num(z[:, Component.ELEVATION])), 1e-3)
+    box = z[:, Component.EAST : Component.UP + 1]
+    out = covariance.copy()
+    out[:, Component.RANGE, Component.RANGE] += p * p
+    out[:, Component.AZIMUTH, Component.AZIMUTH] += across / level**2
+    out[:, Component.ELEVATION, Component.ELEVATION] += across
+    for i in range(Component.EAST, Component.UP + 1):
+        out[:, i, i] += p * p + angle2 * np.nansum(box * box, axis=1)
+    return out
+
+
+def _typical(sigma: FloatArray) -> float:
+    known = sigma[np.isfinite(sigma)]
+    return float(np.median(known)) if len(known) else 0.0
 
 
 def _fixed(sensor: Sensor, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from boresight.frames.pose import PoseTrack, sensor_pose
+from boresight.frames.pose import PoseTrack, add_navigation_noise, sensor_pose
 from boresight.kernels.tracker import GATED, INITIATED, OUTSIDE, UNASSOCIATED, UPDATED, Look
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.core import Plan, make_plan
@@ -157,12 +157,15 @@ class Tracker:
             if not track.covers(times):
                 return None
         position, velocity, axes = _poses(sensor, track, times)
+        R = np.ascontiguousarray(scan.covariance)
+        if track is not None:
+            R = add_navigation_noise(sensor, track, times[:-1], scan.z, R)
         t_look = float(times[-1])
         return Look(
             t=t_look,
             dt=times[:-1] - t_look,
             z=np.ascontiguousarray(scan.z),
-            R=np.ascontiguousarray(scan.covariance),
+            R=R,
             row=np.ascontiguousarray(scan.row, dtype=np.int64),
             sensor_position=position,
             sensor_velocity=velocity,
