@@ -39,3 +39,15 @@ def test_mistakes(
     done = run("passes", *words)
     assert done.code == 2
     assert says in done.err
+
+
+def test_a_damaged_satellite_does_not_take_the_others_with_it(run: Run, tmp_path: Path) -> None:
+    one, two = tle("28057")
+    bad = one[:20] + ("1" if one[20] != "1" else "2") + one[21:]
+    path = tmp_path / "sat.tle"
+    path.write_text(f"BAD\n{bad}\n{two}\nGOOD\n{one}\n{two}\n", encoding="utf-8")
+    done = run("passes", "--tle", path, "--site", 47.45, 8.56, 430, "--hours", 12, "--json")
+    assert done.code == 0
+    assert {r["satellite"] for r in json.loads(done.out)["rows"]} == {"GOOD"}
+    assert "left out" in done.err
+    assert "line 2: the checksum" in done.err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 COLUMNS = {
     "satellite": "satellite",
-    "rise": "rise (UTC)",
+    "rise": "rise\n(UTC)",
     "duration_s": "s",
     "max_elevation_deg": "highest\n°",
     "rise_az_deg": "from\n°",
@@ -76,10 +77,19 @@ def passes(
     place = Site(math.radians(site[0]), math.radians(site[1]), site[2])
     machine = read_site(mount).mount if mount else Mount()
     rows: list[dict[str, Any]] = []
-    for one in orbit.read_elements(read_text(tle), str(tle)):
+    skipped: list[str] = []
+    satellites = orbit.read_elements(read_text(tle), str(tle), skipped)
+    for one in satellites:
         begin = _time(start) if start else orbit.unix_of(one.record.jdsatepoch, one.record.jdsatepochF)
-        found = orbit.passes(one, place, begin, begin + 3600 * hours, math.radians(min_elevation_deg), dut1_s)
-        rows += [_row(one, p, place, machine, beam_width_deg, dut1_s) for p in found]
+        try:
+            found = orbit.passes(one, place, begin, begin + 3600 * hours, math.radians(min_elevation_deg), dut1_s)
+            rows += [_row(one, p, place, machine, beam_width_deg, dut1_s) for p in found]
+        except UserError as error:  # decayed, or elements that SGP4 cannot carry that far
+            if len(satellites) == 1:
+                raise
+            skipped.append(str(error))
+    for told in skipped:
+        print(f"boresight: left out: {told}", file=sys.stderr)
     rows.sort(key=lambda r: r["rise_s"])
     if json:
         parameters = {
@@ -102,7 +112,7 @@ def _row(one: Satellite, p: Pass, site: Site, mount: Mount, beam: float, dut1: f
     azimuth, elevation, _ = look(one, t, site, dut1)
     plan = mount.plan(t, azimuth, elevation)
     reachable = elevation >= mount.elevation[0]
-    error = float(np.degrees(plan.error[reachable].max(initial=0.0)))
+    error = round(float(np.degrees(plan.error[reachable].max(initial=0.0))), 9)
     rate = np.abs(np.diff(np.unwrap(azimuth)) / np.diff(t)).max()
     return {
         "satellite": one.name,

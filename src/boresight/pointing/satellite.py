@@ -42,10 +42,11 @@ class Pass(NamedTuple):
     set_azimuth: float
 
 
-def read_tle(text: str, where: str) -> list[Satellite]:
+def read_tle(text: str, where: str, skipped: list[str] | None = None) -> list[Satellite]:
     """Return the satellites of two-line elements, with or without a line of names before each.
 
     Raises UserError for a line 1 without its line 2, a wrong checksum, and for none at all; `where` is named in it.
+    With `skipped` a satellite whose checksum is wrong is left out and told there instead.
     """
     try:
         record = importlib.import_module("sgp4.api").Satrec
@@ -58,9 +59,14 @@ def read_tle(text: str, where: str) -> list[Satellite]:
             after = lines[i + 1] if i + 1 < len(lines) else ""
             if not (after.startswith("2 ") and len(after) >= 68):
                 raise UserError(f"{where}, line {i + 1}: a line 1 without its line 2")
-            for k, one in enumerate((line, after)):
-                if len(one) >= 69 and one[68].isdigit() and _checksum(one) != int(one[68]):
-                    raise UserError(f"{where}, line {i + 1 + k}: the checksum does not fit: the line is damaged")
+            damaged = [k for k, one in enumerate((line, after)) if not _sound(one)]
+            if damaged:
+                told = f"{where}, line {i + 1 + damaged[0]}: the checksum does not fit: the line is damaged"
+                if skipped is None:
+                    raise UserError(told)
+                skipped.append(told)
+                name = ""
+                continue
             try:
                 satellite = record.twoline2rv(line[:69], after[:69])
             except ValueError as error:
@@ -104,12 +110,12 @@ def read_omm(text: str, where: str) -> list[Satellite]:
     return out
 
 
-def read_elements(text: str, where: str) -> list[Satellite]:
-    """Return the satellites of two-line elements or OMM messages, whichever the text holds."""
+def read_elements(text: str, where: str, skipped: list[str] | None = None) -> list[Satellite]:
+    """Return the satellites of two-line elements or OMM messages, whichever the text holds (see `read_tle`)."""
     first = next((line for line in text.splitlines() if line.strip()), "")
     if first.lstrip()[:1] in "[{<" or "MEAN_MOTION" in first:
         return read_omm(text, where)
-    return read_tle(text, where)
+    return read_tle(text, where, skipped)
 
 
 def ecef_at(satellite: Satellite, t: ArrayLike, dut1: float = 0.0) -> FloatArray:
@@ -187,8 +193,9 @@ def _edge(elevation: Callable[[float], float], top: float, way: float, lowest: f
     return None
 
 
-def _checksum(line: str) -> int:
-    return sum(int(c) if c.isdigit() else (c == "-") for c in line[:68]) % 10
+def _sound(line: str) -> bool:
+    total = sum(int(c) if c.isdigit() else (c == "-") for c in line[:68])
+    return len(line) < 69 or not line[68].isdigit() or total % 10 == int(line[68])
 
 
 def unix_of(jd: float, fraction: float) -> float:
