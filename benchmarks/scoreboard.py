@@ -96,9 +96,9 @@ def rows(folder: Path) -> list[dict[str, Any]]:
             tracker, scans = tracker_for(recording, config, sensors), list(iter_scans(recording, sensors))
             run(tracker, scans[:20])  # kernels loaded
             started = time.process_time()
-            state, made, _ = run(tracker, scans)
+            _, made, _ = run(tracker, scans)
             seconds.append(time.process_time() - started)
-            scores.append(score(recording, track_rows(made, state.names), None, sensors))
+            scores.append(score(recording, track_rows(made), None, sensors))
         each = {f"scenario_{n}": float(np.sqrt((s.gospa[:, 0] ** 2).mean())) for n, s in zip(data, scores, strict=True)}
         soup = dict(zip(("gospa", "tracked", "false_s", "rmse"), STONE_SOUP.get(name, (None,) * 4), strict=True))
         out.append(

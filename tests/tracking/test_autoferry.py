@@ -28,8 +28,8 @@ def scores_of(data: dict[int, Recording], sensors: list[str]) -> list[Score]:
     out = []
     for recording in data.values():
         tracker = tracker_for(recording, config, sensors)
-        state, rows, _ = run(tracker, iter_scans(recording, sensors))
-        out.append(score(recording, track_rows(rows, state.names), None, sensors))
+        _, rows, _ = run(tracker, iter_scans(recording, sensors))
+        out.append(score(recording, track_rows(rows), None, sensors))
     return out
 
 

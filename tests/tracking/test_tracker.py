@@ -24,8 +24,8 @@ CONFIG = TrackerConfig(q=0.01)
 
 
 def tracked(recording: Recording, sensors: list[str] | None = None, config: TrackerConfig = CONFIG) -> TrackRows:
-    state, rows, _ = run(tracker_for(recording, config, sensors), iter_scans(recording, sensors))
-    return track_rows(rows, state.names)
+    _, rows, _ = run(tracker_for(recording, config, sensors), iter_scans(recording, sensors))
+    return track_rows(rows)
 
 
 def same(a: TrackRows, b: TrackRows) -> None:
@@ -152,10 +152,10 @@ def test_stepping_a_snapshot_equals_stepping_the_original(harbour: Recording) ->
     scans = list(iter_scans(harbour))
     state, before, _ = run(tracker, scans[:150], finish=False)
     copy = snapshot(state)
-    a_state, a, _ = run(tracker, scans[150:], state)
-    b_state, b, _ = run(tracker, scans[150:], copy)
-    same(track_rows(before + a, a_state.names), track_rows(before + b, b_state.names))
-    same(track_rows(before + a, a_state.names), tracked(harbour))
+    _, a, _ = run(tracker, scans[150:], state)
+    _, b, _ = run(tracker, scans[150:], copy)
+    same(track_rows(before + a), track_rows(before + b))
+    same(track_rows(before + a), tracked(harbour))
 
 
 RESUME = """
@@ -172,7 +172,7 @@ tracker = tracker_for(recording, CONFIG)
 with np.load(sys.argv[1], allow_pickle=False) as saved:
     state = state_of_arrays(saved, tracker)
 state, rows, _ = run(tracker, list(iter_scans(recording))[150:], state)
-t = track_rows(rows, state.names)
+t = track_rows(rows)
 np.savez(sys.argv[2], t=t.t, track_id=t.track_id, position=t.position, covariance=t.covariance)
 """
 

@@ -103,7 +103,7 @@ def track_recording(recording: Recording, config: TrackerConfig, sensors: list[s
     with _progress(len(scans)) as tick:
         state, rows, decisions = run(tracker, scans, progress=tick)
     seconds = time.perf_counter() - started
-    tracks = track_rows(rows, state.names)
+    tracks = track_rows(rows)
     fates = decision_rows(recording, tracker, decisions, state.names)
     summary: dict[str, Any] = {
         "version": __version__,
@@ -111,7 +111,7 @@ def track_recording(recording: Recording, config: TrackerConfig, sensors: list[s
         "counts": {
             "reports": len(recording.detections),
             "scans": len(scans),
-            "tracks": len(state.names),
+            "tracks": state.numbered,
             "rows": len(tracks),
             "fates": _fates(fates),
         },

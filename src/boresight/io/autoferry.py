@@ -84,7 +84,7 @@ static_wander_m2_s = 0.2
 stop_floor = 0.005
 doubt = 0.01
 confirm_above = 0.95
-hide_below = 0.7
+hide_below = 0.6
 merge_distance_m = 15.0
 clutter_memory_looks = 15.0
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from boresight.kernels.tracker import HIDDEN, VISIBLE, Tracks
 from boresight.tracking.core import Plan
@@ -75,11 +76,12 @@ def due_before(clock: Clock, t_recv: float) -> list[float]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """Rows of tracks.parquet as columns; `birth` names the track until it is numbered."""
+    """Rows of tracks.parquet as columns; `birth` is the detection that began the track."""
 
     t: FloatArray
     t_known: FloatArray
-    birth: np.ndarray
+    track_id: NDArray[np.int64]
+    birth: NDArray[np.int64]
     coasting: np.ndarray
     position: FloatArray  # (n, d)
     velocity: FloatArray  # (n, d)
@@ -104,6 +106,7 @@ def rows_at(tr: Tracks, plan: Plan, t: float, t_known: float, coast_after: float
     return Rows(
         t=np.full(len(shown), t),
         t_known=np.full(len(shown), t_known),
+        track_id=np.zeros(len(shown), np.int64),  # numbered by the tracker
         birth=tr.birth[shown].copy(),
         coasting=float(tr.time[0]) - tr.life[shown, 1] > coast_after,
         position=x[:, pos] + dt * x[:, vel],

@@ -62,7 +62,7 @@ def run(
     return state, rows, decisions
 
 
-def track_rows(rows: Sequence[Rows], names: dict[int, int]) -> TrackRows:
+def track_rows(rows: Sequence[Rows]) -> TrackRows:
     """Join rows to the columns of tracks.parquet; positions in 2-D have NaN for up."""
     if not rows:
         return no_tracks()
@@ -77,7 +77,7 @@ def track_rows(rows: Sequence[Rows], names: dict[int, int]) -> TrackRows:
     return TrackRows(
         t=np.concatenate([r.t for r in rows]),
         t_known=np.concatenate([r.t_known for r in rows]),
-        track_id=track_ids(np.concatenate([r.birth for r in rows]), names),
+        track_id=np.concatenate([r.track_id for r in rows]),
         status=np.where(coasting, coasts, confirmed).astype(np.uint8),
         position=position,
         velocity=velocity,

@@ -31,7 +31,9 @@ def snapshot(state: TrackerState) -> TrackerState:
         ),
         Clock(clock.arrival, clock.emitted, dict(clock.last), {k: list(v) for k, v in clock.gaps.items()}),
         state.pending,
+        state.numbered,
         dict(state.names),
+        dict(state.last_row),
     )
 
 
@@ -40,10 +42,13 @@ def arrays_of_state(state: TrackerState) -> Arrays:
     window, clock = state.window, state.clock
     out: Arrays = {
         "format": np.array([FORMAT]),
-        "scalars": np.array([window.arrivals, len(window.entries), len(window.copies), state.pending], np.int64),
+        "scalars": np.array(
+            [window.arrivals, len(window.entries), len(window.copies), state.pending, state.numbered], np.int64
+        ),
         "clock": np.array([clock.arrival, clock.emitted]),
         "last": np.array(list(clock.last.items()), np.float64).reshape(-1, 2),
         "names": np.array(list(state.names.items()), np.int64).reshape(-1, 2),
+        "last_row": np.array(list(state.last_row.values()), np.float64),
         "copy_keys": np.array([key for key, _ in window.copies], np.float64).reshape(-1, 2),
         "entry_keys": np.array([(*e.key, e.sensor) for e in window.entries], np.float64).reshape(-1, 3),
     }
@@ -68,7 +73,7 @@ def state_of_arrays(arrays: Mapping[str, NDArray[np.generic]], tracker: Tracker)
         raise UserError(f"saved tracker state: not of format {FORMAT}; save it again with this version")
     if arrays["tracks.x"].shape[1] != tracker.plan.n_states or len(arrays["tracks.last_look"]) != len(tracker.sensors):
         raise UserError("saved tracker state: made with other sensors or settings; use the same recording and --config")
-    arrivals, n_entries, n_copies, pending = (int(v) for v in np.asarray(arrays["scalars"], np.int64))
+    arrivals, n_entries, n_copies, pending, numbered = (int(v) for v in np.asarray(arrays["scalars"], np.int64))
     arrival, emitted = (float(v) for v in np.asarray(arrays["clock"], np.float64))
     clock = Clock(arrival, emitted)
     clock.last = {int(s): float(t) for s, t in np.asarray(arrays["last"], np.float64)}
@@ -84,7 +89,9 @@ def state_of_arrays(arrays: Mapping[str, NDArray[np.generic]], tracker: Tracker)
         for i, key in zip(range(n_entries), np.asarray(arrays["entry_keys"], np.float64), strict=True)
     ]
     names = {int(birth): int(name) for birth, name in np.asarray(arrays["names"], np.int64)}
-    return TrackerState(Window(_take_tracks(arrays, "tracks"), arrivals, entries, copies), clock, bool(pending), names)
+    last_row = dict(zip(names, np.asarray(arrays["last_row"], np.float64).tolist(), strict=True))
+    window = Window(_take_tracks(arrays, "tracks"), arrivals, entries, copies)
+    return TrackerState(window, clock, bool(pending), numbered, names, last_row)
 
 
 def _put_tracks(out: Arrays, prefix: str, tracks: Tracks) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from boresight.tracking.output import Clock, Rows, due_at_arrival, due_before, n
 from boresight.tracking.window import Entry, Window, empty_window, insert
 from boresight.types import Fate, FloatArray, Scan, Sensor
 
+MAX_ROW_GAP = 0.5  # s between two rows of one track id
 FATE_OF_CODE = {
     UNASSOCIATED: Fate.UNASSOCIATED,
     UPDATED: Fate.UPDATED,
@@ -50,7 +51,9 @@ class TrackerState:
     window: Window
     clock: Clock
     pending: bool = False  # looks have come at clock.arrival for which rows are still due
-    names: dict[int, int] = field(default_factory=dict)  # birth row -> track id, in order of first showing
+    numbered: int = 0  # track ids given out
+    names: dict[int, int] = field(default_factory=dict)  # birth row -> track id, the newest
+    last_row: dict[int, float] = field(default_factory=dict)  # birth row -> time of its newest row (s)
 
 
 class Output(NamedTuple):
@@ -143,9 +146,8 @@ class Tracker:
     def _emit(self, state: TrackerState, out: Output, t: float, t_known: float) -> None:
         rows = rows_at(state.window.tracks, self.plan, t, t_known, self.config.coast_after)
         if rows is not None:
-            for birth in rows.birth.tolist():
-                state.names.setdefault(birth, len(state.names) + 1)
-            out.rows.append(rows)
+            ids = np.array([_number(state, birth, t) for birth in rows.birth.tolist()], dtype=np.int64)
+            out.rows.append(replace(rows, track_id=ids))
 
     def _look(self, scan: Scan) -> Look | None:
         """Take the declared latency off and place the sensor; None where there is no pose for it."""
@@ -180,6 +182,15 @@ def _poses(sensor: Sensor, track: PoseTrack | None, times: FloatArray) -> tuple[
         n = len(times)
         return np.repeat(position, n, axis=0), np.repeat(velocity, n, axis=0), np.repeat(axes, n, axis=0)
     return sensor_pose(sensor, track, times)
+
+
+def _number(state: TrackerState, birth: int, t: float) -> int:
+    """Return the id of a track's row at `t`: a live track has a row every half second, one shown again begins anew."""
+    if t - state.last_row.get(birth, -np.inf) > MAX_ROW_GAP:
+        state.numbered += 1
+        state.names[birth] = state.numbered
+    state.last_row[birth] = t
+    return state.names[birth]
 
 
 def _decisions(entry: Entry) -> list[Decision]:
