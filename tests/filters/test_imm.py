@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -93,7 +95,86 @@ def test_mixing_keeps_mean_and_covariance_of_the_whole() -> None:
     np.testing.assert_allclose(after[1], before[1], rtol=1e-12)
 
 
+@pytest.mark.parametrize("lag", [None, 0.0, 2.0])
+def test_one_model_smooths_as_that_models_smoother(lag: float | None) -> None:
+    t, sensors, z = reports(np.random.default_rng(6))
+    motion, laid = NearlyConstantVelocity(q=0.5), stream.stack(t, sensors, z)
+    one = InteractingModels((motion,))
+    out = one.smooth(one.run(one.init(0.0, X0, P0, [0.0]), laid, keep=True), lag)
+    x, P = stream.smooth(stream.run(ekf.init(0.0, X0, P0), motion, laid), lag)
+    np.testing.assert_allclose(out.x, x, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(out.P, P, rtol=1e-9, atol=1e-9)
+
+
+def every_sequence(
+    models: InteractingModels, t: np.ndarray, sensor: Position, z: list[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the exact smoothed means (k, 6) and weights (k, r): the smoother of every sequence of models, summed."""
+    r, steps = len(models.motions), np.diff(t, prepend=0.0)
+    logs, means, taken = [], [], []
+    for sequence in itertools.product(range(r), repeat=len(t)):
+        state, before, log = ekf.init(0.0, X0, P0), np.full(r, 1.0 / r), 0.0
+        x, P, xp, Pp, F = [], [], [], [], []
+        for k, j in enumerate(sequence):
+            log += np.log((before @ expm(models.rates * steps[k]))[j])
+            before = np.eye(r)[j]
+            F.append(models.motions[j].F(state.x, steps[k]))
+            state = ekf.predict(state, models.motions[j], t[k])
+            xp.append(state.x), Pp.append(state.P)
+            state, info = ekf.update(state, sensor, z[k])
+            x.append(state.x), P.append(state.P)
+            log += info.log_likelihood
+        for k in range(len(t) - 2, -1, -1):  # textbook recursion of the means
+            x[k] = x[k] + P[k] @ F[k + 1].T @ np.linalg.solve(Pp[k + 1], x[k + 1] - xp[k + 1])
+        logs.append(log), means.append(x), taken.append(np.eye(r)[list(sequence)])
+    share = np.exp(np.array(logs) - max(logs))
+    share /= share.sum()
+    return np.tensordot(share, np.array(means), 1), np.tensordot(share, np.array(taken), 1)
+
+
+def test_smoother_is_near_the_exact_one() -> None:
+    """A target that begins to swerve: the sum over all 2⁶ sequences is exact, and hopeless for more reports."""
+    t = np.arange(1, 7) * 1.0
+    path = [np.array([500 + 40 * s + 6 * max(s - 4, 0) ** 2, 300 + 10 * s, 40 - 5 * s]) for s in t]
+    sensor = Position(4.0)
+    models = InteractingModels((NearlyConstantVelocity(0.1), NearlyConstantVelocity(60.0)), 5.0)
+    squares = []
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        z = [p + 4.0 * rng.normal(size=3) for p in path]
+        exact, _ = every_sequence(models, t, sensor, z)
+        run = models.run(models.init(0.0, X0, P0, [0.0, 0.0]), stream.stack(t, [sensor] * len(t), z), keep=True)
+        out = models.smooth(run)
+        variance = np.diagonal(out.P, axis1=1, axis2=2)
+        squares.append([np.mean((x - exact) ** 2 / variance) for x in (run.x, out.x)])
+    filtered, smoothed = np.sqrt(np.mean(squares, axis=0))
+    assert filtered > 0.9  # σ: what there is to gain
+    assert smoothed < 0.15  # σ: what one Gaussian per model costs
+
+
+def test_smoother_of_unequal_dimensions_is_positive_definite_and_lag_grows_to_all() -> None:
+    t, sensors, z = reports(np.random.default_rng(8))
+    models = InteractingModels(
+        (NearlyConstantVelocity(0.1), CoordinatedTurn(0.1, 1e-3), NearlyConstantAcceleration(0.01)), 5.0
+    )
+    run = models.run(models.init(0.0, X0, P0, [0.0, 0.1, 1.0]), stream.stack(t, sensors, z), keep=True)
+    whole, none, some = models.smooth(run), models.smooth(run, 0.0), models.smooth(run, 3.0)
+    np.testing.assert_array_equal(models.smooth(run, 1e9).x, whole.x)
+    np.testing.assert_allclose(none.x, run.x, rtol=1e-12)
+    for out in (whole, some):
+        assert np.linalg.eigvalsh(out.P).min() > 0.0
+        np.testing.assert_array_equal(out.P, np.swapaxes(out.P, 1, 2))
+        np.testing.assert_allclose(out.weights.sum(axis=1), 1.0, rtol=1e-12)
+    truth = np.array([[500 + 10 * s, 300 + 40 * np.sin(0.2 * s), 40.0] for s in t])
+    error = [np.sqrt(np.mean((out.x[:, :3] - truth) ** 2)) for out in (run, some, whole)]
+    assert error[0] > 1.2 * max(error[1:])
+
+
 def test_mistakes_are_named() -> None:
+    one = InteractingModels((NearlyConstantVelocity(1.0),))
+    out = one.run(one.init(0.0, X0, P0, [0.0]), stream.stack([1.0], [Position(1.0)], [np.zeros(3)]))
+    with pytest.raises(UserError, match="keep=True"):
+        one.smooth(out)
     with pytest.raises(UserError, match="at least one motion model"):
         InteractingModels(())
     with pytest.raises(UserError, match="same number of dimensions"):

@@ -14,6 +14,7 @@ from boresight.errors import UserError
 from boresight.filters import ekf
 from boresight.filters.stream import Reports, require_all
 from boresight.kernels import imm
+from boresight.kernels.imm_smoothing import imm_smooth
 from boresight.models import check
 from boresight.models.motion.base import SCALARS, KernelMotion
 from boresight.models.protocols import MeasurementModel
@@ -33,12 +34,14 @@ class MixtureState(NamedTuple):
 
 
 class MixtureRun(NamedTuple):
-    """A stream's results: `x` (k, n), `P` (k, n, n), `weights` (k, r)."""
+    """A stream's results: `x` (k, n), `P` (k, n, n), `weights` (k, r); where kept, each model's own `X`, `PP`."""
 
     t: FloatArray
     x: FloatArray
     P: FloatArray
     weights: FloatArray
+    X: FloatArray  # (k, r, N), or empty
+    PP: FloatArray  # (k, r, N, N), or empty
 
 
 @dataclass(frozen=True)
@@ -137,27 +140,51 @@ class InteractingModels:
         scale: FloatArray | None = None,
         memory: float = 0.0,
         limit: float = 1.0,
+        keep: bool = False,
     ) -> MixtureRun:
         """Filter a whole stream in one call; the models must share one kernel, as the built-in ones do.
 
-        The last four are for `filters.adaptive`: which sensor each report is of (k,), the scales (s, 7) of their noise
-        variances (changed in place), how many reports the adaptation remembers (0: none), and its limit.
+        `keep` keeps each model's belief after every report, as `smooth` needs. The four before are for
+        `filters.adaptive`: which sensor each report is of (k,), the scales (s, 7) of their noise variances (changed in
+        place), how many reports the adaptation remembers (0: none), and its limit.
         """
-        if len({id(m.kernel) for m in self.motions}) > 1:
-            raise UserError("a stream needs motion models of one kernel: give your kernel a code in its parameters")
         k, n, r = len(reports.t), 2 * self.motions[0].dimensions, len(self.motions)
-        widest = max(len(m.parameters) for m in self.motions)
-        parameters = np.array([np.pad(m.parameters, (0, widest - len(m.parameters))) for m in self.motions])
         sensor = np.zeros(k, dtype=np.int64) if sensor is None else sensor
         scale = np.ones((1, 7)) if scale is None else scale
         x, P, weights = np.empty((k, n)), np.empty((k, n, n)), np.empty((k, r))
+        N, kept = int(self.sizes.max()), k if keep else 0
+        X, PP = np.empty((kept, r, N)), np.empty((kept, r, N, N))
         done = imm.imm_stream(
-            self.motions[0].kernel, parameters, self.sizes, self.labels, self.rates, reports.observe, state.weights,
-            state.X, state.PP, state.t, reports.t, reports.z, reports.context, sensor, scale, memory, limit, n,
-            x, P, weights,
+            self.motions[0].kernel, self._parameters(), self.sizes, self.labels, self.rates, reports.observe,
+            state.weights, state.X, state.PP, state.t, reports.t, reports.z, reports.context, sensor, scale, memory,
+            limit, n, x, P, weights, X, PP,
         )  # fmt: skip
         require_all(done, reports)
-        return MixtureRun(reports.t, x, P, weights)
+        return MixtureRun(reports.t, x, P, weights, X, PP)
+
+    def smooth(self, run: MixtureRun, lag: float | None = None) -> MixtureRun:
+        """Return mean, covariance and weights given all reports, or those up to `lag` (s) later (fixed lag).
+
+        A Rauch-Tung-Striebel step for every pair of models that follow each other (`kernels.imm_smoothing`); with one
+        model it is that model's smoother. `run` must have been made with `keep`; raises UserError.
+        """
+        if len(run.X) != len(run.t):
+            raise UserError("each model's belief is needed to smooth: filter with run(…, keep=True)")
+        if lag is not None and not lag >= 0.0:
+            raise UserError(f"lag must be at least 0 s, not {lag!r}")
+        x, P, weights = np.empty_like(run.x), np.empty_like(run.P), np.empty_like(run.weights)
+        imm_smooth(
+            self.motions[0].kernel, self._parameters(), self.sizes, self.labels, self.rates, run.t, run.weights, run.X,
+            run.PP, math.inf if lag is None else lag, run.x.shape[1], x, P, weights,
+        )  # fmt: skip
+        return MixtureRun(run.t, x, P, weights, run.X[:0], run.PP[:0])
+
+    def _parameters(self) -> FloatArray:
+        """Return the models' parameters (r, p), padded, for a stream kernel."""
+        if len({id(m.kernel) for m in self.motions}) > 1:
+            raise UserError("a stream needs motion models of one kernel: give your kernel a code in its parameters")
+        widest = max(len(m.parameters) for m in self.motions)
+        return np.array([np.pad(m.parameters, (0, widest - len(m.parameters))) for m in self.motions])
 
     def _joined(self, t: float, weights: FloatArray, X: FloatArray, PP: FloatArray) -> MixtureState:
         x, P = imm.combine(weights, X, PP, 2 * self.motions[0].dimensions)

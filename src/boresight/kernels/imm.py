@@ -22,6 +22,7 @@ from boresight.types.sensor import FloatArray
 NEGLIGIBLE = 1e-15  # share of a model in the mixture of another
 INTS = types.int64[::1]
 INT_MATRIX = types.int64[:, ::1]
+STACKS = types.float64[:, :, :, ::1]
 
 
 @njit(cache=True)
@@ -71,7 +72,7 @@ def mix(
             if share[i] < NEGLIGIBLE:
                 continue
             for a in range(n):
-                at[i, a] = _where(labels, i, sizes[i], labels[j, a], a)
+                at[i, a] = place(labels, i, sizes[i], labels[j, a], a)
                 x[i, a] = X[i, at[i, a]] if at[i, a] >= 0 else X[j, a]
                 X_out[j, a] += share[i] * x[i, a]
         for i in range(r):
@@ -92,7 +93,7 @@ def mix(
 
 
 @njit(cache=True)
-def _where(labels: IntArray, i: int, size: int, label: int, guess: int) -> int:
+def place(labels: IntArray, i: int, size: int, label: int, guess: int) -> int:
     """Return the index of a label in row i, most often `guess`; -1 where it is not."""
     if guess < size and labels[i, guess] == label:
         return guess
@@ -175,10 +176,38 @@ def adapt(
         scale[c] = min(max((1.0 - g) * scale[c] + g * shown / nominal[i], 1.0 / limit), limit)
 
 
+@njit(cache=True)
+def learn(
+    observe: Any,
+    x: FloatArray,
+    P: FloatArray,
+    z: FloatArray,
+    context: FloatArray,
+    scale: FloatArray,
+    bias: FloatArray,
+    seen: FloatArray,
+    memory: float,
+    limit: float,
+) -> None:
+    """Show `adapt` one report's residual at the updated mean `x` (n,), covariance `P`: one sensor's rows (7,)."""
+    n = x.shape[0]
+    y, H, R = np.empty(7), np.empty((7, n)), np.empty((7, 7))
+    rows = np.empty(7, np.int64)
+    m = observe(x, z, context, y, H, R)
+    rescale(np.ones(7), z, m, rows, R)
+    nominal, spread = np.empty(m), np.zeros(m)
+    for i in range(m):
+        nominal[i] = R[i, i]
+        for a in range(n):
+            for b in range(n):
+                spread[i] += H[i, a] * P[a, b] * H[i, b]
+    adapt(scale, bias, seen, rows[:m], y, spread, nominal, memory, limit)
+
+
 @njit(
     types.int64(
         MOTION, MATRIX, INTS, INT_MATRIX, MATRIX, OBSERVATION, VECTOR, MATRIX, STACK, types.float64, VECTOR, MATRIX,
-        MATRIX, INTS, MATRIX, types.float64, types.float64, types.int64, MATRIX, STACK, MATRIX,
+        MATRIX, INTS, MATRIX, types.float64, types.float64, types.int64, MATRIX, STACK, MATRIX, STACK, STACKS,
     ),
     cache=True,
 )  # fmt: skip
@@ -204,11 +233,14 @@ def imm_stream(
     x_out: FloatArray,
     P_out: FloatArray,
     weights_out: FloatArray,
+    X_kept: FloatArray,
+    P_kept: FloatArray,
 ) -> int:
     """Filter k reports with r models that share one motion kernel, told apart by `parameters` (r, p).
 
     `rates` (r, r) is the generator of the Markov chain between models (1/s, rows add to zero). Filled per report: the
-    moment-matched mean and covariance of the first `n_out` components and the weights (k, r). Returns reports done.
+    moment-matched mean and covariance of the first `n_out` components and the weights (k, r); unless they are empty,
+    `X_kept` (k, r, N) and `P_kept` (k, r, N, N) with each model's own. Returns reports done.
 
     `sensor` (k,) says which row of `scale` (s, 7) multiplies the noise variances; with `memory` > 0 (reports) the
     scales are adapted, see `adapt`.
@@ -248,20 +280,9 @@ def imm_stream(
         weights = reweigh(weights, log_likelihoods)
         x_out[k], P_out[k] = combine(weights, X, P, n_out)
         weights_out[k] = weights
+        if X_kept.shape[0] > 0:
+            X_kept[k], P_kept[k] = X, P
         if memory > 0.0:
-            if H.shape[1] != n_out:
-                moved, F, Q = np.empty(n_out), np.empty((n_out, n_out)), np.empty((n_out, n_out))
-                H = np.empty((7, n_out))
-            m = observe(x_out[k], z[k], context[k], y, H, R)
-            rescale(np.ones(7), z[k], m, rows, R)
-            spread = np.empty(7)
-            nominal = np.empty(7)
-            for i in range(m):
-                nominal[i] = R[i, i]
-                spread[i] = 0.0
-                for a in range(n_out):
-                    for b in range(n_out):
-                        spread[i] += H[i, a] * P_out[k, a, b] * H[i, b]
             s = sensor[k]
-            adapt(scale[s], bias[s], seen[s], rows[:m], y, spread, nominal, memory, limit)
+            learn(observe, x_out[k], P_out[k], z[k], context[k], scale[s], bias[s], seen[s], memory, limit)
     return len(t)

@@ -11,14 +11,14 @@ from boresight.types.sensor import FloatArray
 
 @njit(cache=True)
 def smoother_gain(P: FloatArray, F: FloatArray, P_predicted: FloatArray) -> FloatArray:
-    """Return G = P Fᵀ P_predicted⁻¹ (n, n)."""
-    n = P.shape[0]
+    """Return G = P Fᵀ P_predicted⁻¹ (m, n); P (m, n) is the covariance of what is smoothed with what was moved by F."""
+    m, n = P.shape
     L = np.zeros((n, n))
-    G = np.zeros((n, n))
+    G = np.zeros((m, n))
     if not cholesky(P_predicted, L):
         return G
     row = np.empty(n)
-    for i in range(n):
+    for i in range(m):
         for j in range(n):
             s = 0.0
             for k in range(n):

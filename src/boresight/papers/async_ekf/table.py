@@ -90,10 +90,16 @@ def inflated(reports: Reports, noise: float) -> Reports:
     return reports._replace(context=context)
 
 
-def _imm(data: Data, run: int) -> Outcome:
-    state = data.state(run)
-    out = IMM.run(IMM.init(0.0, state.x, state.P, [0.0, 0.1, ACCELERATION_SIGMA]), data.reports(run))
-    return Outcome(out.x[data.at], out.P[data.at])
+def _imm(smooth: bool = False) -> Method:
+    def method(data: Data, run: int) -> Outcome:
+        state = data.state(run)
+        begun = IMM.init(0.0, state.x, state.P, [0.0, 0.1, ACCELERATION_SIGMA])
+        out = IMM.run(begun, data.reports(run), keep=smooth)
+        if smooth:
+            out = IMM.smooth(out)
+        return Outcome(out.x[data.at], out.P[data.at])
+
+    return method
 
 
 def _adaptive(adaptive: AdaptiveNoise, noise: float = 1.0) -> Method:
@@ -114,11 +120,12 @@ METHODS: dict[str, Method] = {
     "radar_only": _own_times(CV, radar_only=True),
     "cv": _own_times(CV),
     "ca": _own_times(CA),
-    "imm": _imm,
+    "imm": _imm(),
     "adaptive_q": _adaptive(AdaptiveNoise(replace(CV, q=Q / 30.0), memory=0)),
     "adaptive_r": _adaptive(AdaptiveNoise(CV, q_factors=(1.0,)), noise=25.0),
     "rts_cv": _own_times(CV, smooth=True),
     "rts_ca": _own_times(CA, smooth=True),
+    "rts_imm": _imm(smooth=True),
 }
 
 
@@ -155,7 +162,7 @@ def table(name: str, runs: int, seed: int, methods: tuple[str, ...] = tuple(METH
     return rows
 
 
-SHOWN = ("interpolated", "radar_only", "cv", "ca", "imm", "adaptive_q", "adaptive_r", "rts_ca")
+SHOWN = ("interpolated", "radar_only", "cv", "ca", "imm", "adaptive_q", "adaptive_r", "rts_ca", "rts_imm")
 
 
 def over_time(
