@@ -78,24 +78,15 @@ def assign_sparse(start: IntArray, column: IntArray, cost: FloatArray, n_columns
         size = 0
         row = first
         base = 0.0  # length of the shortest path to `row`
-        best_alone = 0.0  # leaving `first` alone
-        alone_row = first
+        shortest = 0.0  # of the ends found so far: `first` stays alone
+        alone = first
         end = -1
         while True:
+            dual = _dual(row, col_of_row[row], start, column, cost, price)
             for e in range(start[row], start[row + 1]):
                 c = column[e]
-                if closed[c]:
-                    continue
-                # reduced cost of the entry; the row's own dual is the reduced cost of what it holds now
-                held = col_of_row[row]
-                u = 0.0
-                if held >= 0:
-                    for f in range(start[row], start[row + 1]):
-                        if column[f] == held:
-                            u = cost[f] - price[held]
-                            break
-                d = base + cost[e] - price[c] - u
-                if d < dist[c] and d < best_alone:
+                d = base + cost[e] - price[c] - dual
+                if not closed[c] and d < dist[c] and d < shortest:
                     if dist[c] == np.inf:
                         touched[n_touched] = c
                         n_touched += 1
@@ -104,54 +95,57 @@ def assign_sparse(start: IntArray, column: IntArray, cost: FloatArray, n_columns
                     _sift_up(heap_d, heap_c, size, d, c)
                     size += 1
             c = -1
-            while size > 0:
-                c = heap_c[0]
-                d = heap_d[0]
+            while size > 0 and c < 0:
+                c = heap_c[0] if not closed[heap_c[0]] and heap_d[0] == dist[heap_c[0]] else -1
                 _pop(heap_d, heap_c, size)
                 size -= 1
-                if not closed[c] and d == dist[c]:
-                    break
-                c = -1
-            if c < 0 or dist[c] >= best_alone:
+            if c < 0 or dist[c] >= shortest:
                 break
             closed[c] = True
+            base = dist[c]
             if row_of_col[c] < 0:
                 end = c
-                best_alone = dist[c]
+                shortest = base
                 break
             row = row_of_col[c]
-            base = dist[c]
-            # this row could give its column up and stay alone
-            for f in range(start[row], start[row + 1]):
-                if column[f] == c:
-                    alone = base - (cost[f] - price[c])
-                    break
-            if alone < best_alone:
-                best_alone = alone
-                alone_row = row
+            up = base - _dual(row, c, start, column, cost, price)  # it could give its column up and stay alone
+            if up < shortest:
+                shortest = up
+                alone = row
                 end = -1
-        length = best_alone
         for k in range(n_touched):
             c = touched[k]
-            if closed[c] and dist[c] < length:
-                price[c] += dist[c] - length
-        # augment: from the free column `end`, or from the row that stays alone
-        c = end
-        if end < 0:
-            row = alone_row
-            c = col_of_row[row]
-            col_of_row[row] = -1
-            if row != first:
-                row_of_col[c] = -1
-        if not (end < 0 and alone_row == first):
-            while True:
-                row = came_from[c]
-                previous = col_of_row[row]
-                col_of_row[row] = c
-                row_of_col[c] = row
-                if row == first:
-                    break
-                c = previous
-        for k in range(n_touched):
-            dist[touched[k]] = np.inf
-            closed[touched[k]] = False
+            if closed[c] and dist[c] < shortest:
+                price[c] += dist[c] - shortest
+            dist[c] = np.inf
+            closed[c] = False
+        _augment(first, end, alone, came_from, col_of_row, row_of_col)
+
+
+@njit(cache=True)
+def _dual(row: int, held: int, start: IntArray, column: IntArray, cost: FloatArray, price: FloatArray) -> float:
+    """Return a row's dual: the reduced cost of the column it holds, zero where it is alone."""
+    for e in range(start[row], start[row + 1]):
+        if column[e] == held:
+            return float(cost[e] - price[held])
+    return 0.0
+
+
+@njit(cache=True)
+def _augment(first: int, end: int, alone: int, came_from: IntArray, col_of_row: IntArray, row_of_col: IntArray) -> None:
+    """Move the assignment along the path back from the free column `end`, or from the row that stays `alone`."""
+    c = end
+    if end < 0:
+        if alone == first:
+            return
+        c = col_of_row[alone]
+        col_of_row[alone] = -1
+        row_of_col[c] = -1
+    while True:
+        row = came_from[c]
+        previous = col_of_row[row]
+        col_of_row[row] = c
+        row_of_col[c] = row
+        if row == first:
+            return
+        c = previous
