@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boresight.fuse.compression import combine, compress, compressed_variance
+from boresight.align.compression import combine, compress, compressed_variance
 from boresight.papers.shao2012.scenario import SETS, simulate
 from boresight.papers.shao2012.table import over_time, table
 

@@ -16,6 +16,7 @@ app = App(name="paper", help="Print a paper's table: as printed, corrected, and 
 PAPERS: dict[str, tuple[str, str]] = {
     "shao2012": ("boresight.cli.paper_shao2012:shao2012", "Radar and infrared in modified spherical coordinates."),
     "async_ekf": ("boresight.cli.paper_async_ekf:async_ekf", "Radar and infrared at different times."),
+    "mao2015": ("boresight.cli.paper_mao2015:mao2015", "Radar angles and a window of infrared samples around them."),
     "wang2009": ("boresight.cli.paper_wang2009:wang2009", "Pixels of a moving camera, steadied: the paper's 8 frames."),
     "phased_array": ("boresight.cli.paper_phased_array:phased_array", "Several guide sources steer one beam."),
 }

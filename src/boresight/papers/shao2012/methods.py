@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from boresight.align.compression import combine, compress, compressed_variance
 from boresight.filters.stream import Reports
-from boresight.fuse.compression import combine, compress, compressed_variance
 from boresight.kernels import msc_stream, smoothing
 from boresight.kernels.msc import inverse_jacobian
 from boresight.kernels.msc_stream import EXACT, PRINTED, msc_from_world, world_from_msc

@@ -1,0 +1,1 @@
+"""mao2015: a slow radar and a fast infrared sensor, fused over a window of infrared samples."""
