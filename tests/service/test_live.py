@@ -8,6 +8,7 @@ import math
 import shutil
 import socket
 import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -20,6 +21,7 @@ from boresight.errors import UserError
 from boresight.pointing.mount import Mount
 from boresight.service.live import run_live
 from boresight.service.rotctld import Rotator
+from boresight.service.sockets import Tcp, Udp
 
 SITE = """
 [site]
@@ -127,6 +129,62 @@ def test_reports_in_commands_out(tmp_path: Path) -> None:
     # this runs on the wall clock: where other work holds the processor up for a moment, single commands may suffer
     assert np.median(errors) < 1.0
     assert sum(c["mode"] == "fused" for c in late) > len(late) / 2
+
+
+def test_a_flood_is_bounded_and_every_datagram_of_it_counted() -> None:
+    source = Udp("127.0.0.1:0", 100)
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+            for _ in range(20_000):  # far beyond what the system's buffer holds
+                s.sendto(b"x" * 200, source.socket.getsockname())
+        assert source.overflow() > 0 or sys.platform != "linux"
+        first = source.read()
+        assert len(first) == 100
+        taken = len(first)
+        while batch := source.read():
+            assert len(batch) <= 100
+            taken += len(batch)
+        if sys.platform == "linux":
+            assert taken + source.overflow() == 20_000
+    finally:
+        source.close()
+
+
+def test_lines_beyond_what_is_taken_at_once_are_counted() -> None:
+    source = Tcp("127.0.0.1:0", 5)
+    try:
+        with socket.create_connection(source.server.getsockname()) as s:
+            s.sendall(b"x\n" * 12)
+            taken, until = 0, time.time() + 5.0
+            while taken + source.overflow() < 12 and time.time() < until:
+                batch = source.read()
+                assert len(batch) <= 5
+                taken += len(batch)
+            assert taken + source.overflow() == 12
+            assert source.overflow() > 0
+    finally:
+        source.close()
+
+
+def test_the_loop_tells_of_an_overflow(tmp_path: Path) -> None:
+    port = free_port()
+    (tmp_path / "site.toml").write_text(SITE.format(port=port, out=free_port(), rotator=""), encoding="utf-8")
+    station = read_site(tmp_path / "site.toml")
+    lines = 2_000
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+        flooded = []
+
+        def flood() -> bool:  # called once per pass, while the loop reads nothing
+            if not flooded:
+                for _ in range(lines):
+                    s.sendto(b"{broken\n" * 70, ("127.0.0.1", port))
+                flooded.append(True)
+            return False
+
+        counts = run_live(station, pointer_for(station), 1.5, None, stop=flood)
+    dropped = counts["overflow"] - 6 * (counts["malformed"] // 64)
+    assert counts["malformed"] % 64 == 0  # 64 of the 70 lines of a datagram are looked at, the others counted
+    assert dropped + counts["malformed"] // 64 == lines or sys.platform != "linux"
 
 
 def ask(port: int) -> tuple[float, float]:

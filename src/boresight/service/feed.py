@@ -20,7 +20,8 @@ from boresight.types import Site
 from boresight.types.sensor import FloatArray
 
 LONGEST = 2048  # bytes of one line; longer ones are counted and left out
-PER_TICK = 1000  # datagrams taken between two commands; a flood beyond it is counted
+PER_READ = 1000  # datagrams or lines taken at once; what is lost beyond it is counted
+LINES = 64  # in one datagram
 AHEAD = 5.0  # s that a stamp may lie in the future
 BEHIND = 30.0  # s that it may lie in the past
 DEG = math.pi / 180.0
@@ -77,7 +78,10 @@ class Feed:
     def parse(self, data: bytes, now: float) -> list[Report]:
         """Return the reports in a datagram (one or more lines) that arrived at `now` (s)."""
         out = []
-        for line in data.split(b"\n", 64)[:64]:
+        lines = data.split(b"\n", LINES)
+        if len(lines) > LINES and lines[LINES].strip():
+            self.counts["overflow"] += 1 + lines[LINES].rstrip().count(b"\n")
+        for line in lines[:LINES]:
             if not line.strip():
                 continue
             report = self._line(line, now)

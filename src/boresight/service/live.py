@@ -15,7 +15,7 @@ from boresight.config.site import Station
 from boresight.errors import UserError
 from boresight.pointing.pointer import Pointer, PointerState, Pointing
 from boresight.service.elements import Elements
-from boresight.service.feed import PER_TICK, Feed, origins
+from boresight.service.feed import PER_READ, Feed, origins
 from boresight.service.rotctld import Rotator
 from boresight.service.sockets import Broadcast, Input, Serial, Tcp, Udp, address
 
@@ -81,6 +81,7 @@ def run_live(
         pass
     finally:
         for source in inputs:
+            feed.counts["overflow"] += source.overflow()
             source.close()
         if out is not None:
             out.close()
@@ -125,11 +126,11 @@ def _inputs(station: Station) -> list[Input]:
     wanted = station.file.input
     inputs: list[Input] = []
     if wanted.udp:
-        inputs.append(Udp(wanted.udp, PER_TICK))
+        inputs.append(Udp(wanted.udp, PER_READ))
     if wanted.tcp:
-        inputs.append(Tcp(wanted.tcp, PER_TICK))
+        inputs.append(Tcp(wanted.tcp, PER_READ))
     if wanted.serial:
-        inputs.append(Serial(wanted.serial, wanted.baud, PER_TICK))
+        inputs.append(Serial(wanted.serial, wanted.baud, PER_READ))
     if not inputs and not station.elements:
         raise UserError("the site file has no [input]: give udp, tcp or serial, or use --replay")
     return inputs

@@ -5,16 +5,23 @@ from __future__ import annotations
 import contextlib
 import importlib
 import socket
+import struct
+import sys
 from typing import Any, Protocol
 
 from boresight.errors import UserError
 
 BUFFER = 1 << 16  # bytes kept of an unfinished line, then it is dropped
 CONNECTIONS = 32
+MEMINFO, DROPS = 55, 8  # Linux: SO_MEMINFO, and where in its nine numbers the drops stand
 
 
 class Input(Protocol):
     """Something that has bytes, or not."""
+
+    def overflow(self) -> int:
+        """Return how many datagrams or lines came faster than they were taken, and are lost."""
+        ...
 
     def read(self) -> list[bytes]:
         """Return whole datagrams or lines that have arrived, without waiting."""
@@ -50,8 +57,15 @@ class Udp:
         self.socket.setblocking(False)
         self.most = most
 
+    def overflow(self) -> int:
+        """Return how many datagrams the system has dropped since its buffer was full; 0 where it does not say."""
+        if sys.platform != "linux":
+            return 0
+        told = self.socket.getsockopt(socket.SOL_SOCKET, MEMINFO, 4 * (DROPS + 1))
+        return int(struct.unpack(f"{len(told) // 4}I", told)[DROPS])
+
     def read(self) -> list[bytes]:
-        """Return at most `most` datagrams: a flood waits in the system's buffer, which drops."""
+        """Return at most `most` datagrams: a flood waits in the system's buffer, which drops and counts."""
         out: list[bytes] = []
         with contextlib.suppress(BlockingIOError, ConnectionError):
             while len(out) < self.most:
@@ -81,7 +95,11 @@ class Tcp:
         self.server.listen(CONNECTIONS)
         self.server.setblocking(False)
         self.peers: dict[socket.socket, bytes] = {}
-        self.most = most
+        self.most, self.lost = most, 0
+
+    def overflow(self) -> int:
+        """Return how many lines were beyond `most` in one read, or longer than the buffer."""
+        return self.lost
 
     def read(self) -> list[bytes]:
         """Return whole lines; an unfinished one longer than the buffer is dropped with its beginning."""
@@ -103,8 +121,10 @@ class Tcp:
                 del self.peers[peer]
                 continue
             *lines, rest = (self.peers[peer] + data).split(b"\n")
+            self.lost += len(rest) >= BUFFER
             self.peers[peer] = rest if len(rest) < BUFFER else b""
             out += lines
+        self.lost += max(len(out) - self.most, 0)
         return out[: self.most]
 
     def files(self) -> list[socket.socket]:
@@ -128,6 +148,7 @@ class Serial:
             raise UserError("input.serial needs pyserial: install boresight[serial]") from None
         self.port, self.baud, self.most, self.rest = port, baud, most, b""
         self.device: Any = None
+        self.lost = 0
         if not self._open():
             raise UserError(f"input.serial = '{port}': cannot be opened")
 
@@ -137,6 +158,10 @@ class Serial:
         except (OSError, ValueError):
             self.device = None
         return self.device is not None
+
+    def overflow(self) -> int:
+        """Return how many lines were beyond `most` in one read, or longer than the buffer."""
+        return self.lost
 
     def read(self) -> list[bytes]:
         """Return whole lines."""
@@ -149,6 +174,7 @@ class Serial:
             return []
         lines: list[bytes] = (self.rest + bytes(data)).split(b"\n")
         rest = lines.pop()
+        self.lost += (len(rest) >= BUFFER) + max(len(lines) - self.most, 0)
         self.rest = rest if len(rest) < BUFFER else b""
         return lines[: self.most]
 
