@@ -85,4 +85,14 @@ def test_async_ekf_json() -> None:
         "adaptive_q",
         "adaptive_r",
         "rts_ca",
+        "rts_imm",
     }
+
+
+@pytest.mark.parametrize("paper", ["shao2012", "async_ekf", "phased_array"])
+def test_runs_and_seed_are_checked(paper: str) -> None:
+    for words, says in ((("--runs", "0"), "--runs must be at least 1"), (("--seed", "-3"), "--seed must be 0 or more")):
+        done = boresight("paper", paper, *words)
+        assert done.returncode == 2
+        assert says in done.stderr
+        assert done.stderr.count("\n") == 1

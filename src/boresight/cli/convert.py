@@ -179,6 +179,8 @@ def _rows(source: str, values: tuple[float, ...], path: Path | None) -> tuple[An
     if path is None:
         if not least <= len(values) <= len(names):
             raise UserError(f"{source} takes {len(names)} values ({' '.join(names)}), not {len(values)}")
+        if not all(map(math.isfinite, values)):
+            raise UserError(f"the values must be finite numbers, not {' '.join(map(str, values))}")
         return np.array([values], dtype=np.float64), [{}]
     if values:
         raise UserError("give either values or --csv, not both")

@@ -31,6 +31,14 @@ def say(what: str) -> None:
         print(f"boresight: {what} …", file=sys.stderr, flush=True)
 
 
+def check_runs(runs: int, seed: int) -> None:
+    """Raise UserError unless there is a run to make and the seed is one."""
+    if runs < 1:
+        raise UserError(f"--runs must be at least 1, not {runs}")
+    if seed < 0:
+        raise UserError(f"--seed must be 0 or more, not {seed}")
+
+
 LOADING = "loading kernels (the first run compiles them, about half a minute)"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from boresight.cli.output import print_json, print_table
-from boresight.cli.paper import LOADING, say, write_image
+from boresight.cli.paper import LOADING, check_runs, say, write_image
 from boresight.errors import UserError, did_you_mean
 
 COLUMNS = {
@@ -49,8 +49,7 @@ def async_ekf(
         raise UserError(
             f"--scenario must be one of {', '.join(known)}, not '{scenario}'{did_you_mean(scenario, known)}"
         )
-    if runs < 1:
-        raise UserError(f"--runs must be at least 1, not {runs}")
+    check_runs(runs, seed)
     if plot is not None:
         _plot(plot, scenario, runs, seed)
     rows = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from boresight.cli.output import print_json, print_table
+from boresight.cli.paper import check_runs
 from boresight.errors import UserError, did_you_mean
 
 COLUMNS = {
@@ -39,8 +40,7 @@ def phased_array(*, scenario: str = "nominal", runs: int = 12, seed: int = 1, js
         raise UserError(
             f"--scenario must be one of {', '.join(known)}, not '{scenario}'{did_you_mean(scenario, known)}"
         )
-    if runs < 1:
-        raise UserError(f"--runs must be at least 1, not {runs}")
+    check_runs(runs, seed)
     rows = table(tuple(SCENARIOS) if scenario == "all" else (scenario,), runs, seed)
     if json:
         print_json("paper phased_array", {"scenario": scenario, "runs": runs, "seed": seed}, rows)

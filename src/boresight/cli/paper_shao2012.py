@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from boresight.cli.output import print_json, print_table
-from boresight.cli.paper import LOADING, say, write_image
+from boresight.cli.paper import LOADING, check_runs, say, write_image
 from boresight.errors import UserError, did_you_mean
 
 COLUMNS = {  # the ratio in elevation is left to --json: 80 columns
@@ -70,8 +70,7 @@ def shao2012(
     known = [*SETS, *CASES]
     if set_ not in known:
         raise UserError(f"--set must be one of {', '.join(known)}, not '{set_}'{did_you_mean(set_, known)}")
-    if runs < 1:
-        raise UserError(f"--runs must be at least 1, not {runs}")
+    check_runs(runs, seed)
     if plot is not None:
         _plot(plot, set_, runs, seed)
     rows = _rows(set_, runs, seed)

@@ -63,6 +63,13 @@ class Setting:
     sigma_range: float = 0.0
     sigma_height: float = 0.0
 
+    def __post_init__(self) -> None:
+        for name in ("pixel", "attitude", "mount", "position", "range", "height"):
+            if not 0.0 <= getattr(self, f"sigma_{name}") < np.inf:
+                raise UserError(f"the sigma of {name} must be 0 or more and finite")
+        if self.site is not None and not abs(self.site.latitude) <= np.pi / 2 + 1e-12:
+            raise UserError(f"the site's latitude {np.degrees(self.site.latitude):g}° is beyond ±90°")
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Converted:
@@ -79,9 +86,12 @@ def convert(values: FloatArray, source: Kind, target: Kind, setting: Setting) ->
     A pixel, or an azimuth and elevation without range (two columns), is a direction: it converts to azel as such, and
     to a place with `range_m` or `height_m`. Raises UserError for what the way needs and the setting does not give.
     """
-    if source == Kind.AZEL and (np.abs(values[:, 1]) > np.pi / 2 + 1e-12).any():
-        row = int(np.argmax(np.abs(values[:, 1])))
-        raise UserError(f"row {row}: elevation {np.degrees(values[row, 1]):g}° is beyond ±90°")
+    upright = {Kind.AZEL: (1, "elevation"), Kind.GEODETIC: (0, "latitude")}
+    if source in upright:
+        column, name = upright[source]
+        row = int(np.argmax(np.abs(values[:, column])))
+        if abs(values[row, column]) > np.pi / 2 + 1e-12:
+            raise UserError(f"row {row}: {name} {np.degrees(values[row, column]):g}° is beyond ±90°")
     if source in (Kind.PIXEL, Kind.AZEL) and values.shape[1] == 2:
         return _from_direction(values, source, target, setting)
     if {source, target} == {Kind.GEODETIC, Kind.ECEF}:
