@@ -25,6 +25,9 @@ class Verdict(StrEnum):
     JUMP = "jump"
     DUPLICATE = "duplicate"
     STALE = "stale"
+    OUT_OF_RANGE = "out_of_range"
+    OUT_OF_ELEVATION = "out_of_elevation"
+    TOO_FAST = "too_fast"
     REOPENED = "reopened"  # a run of rejections that agree with each other: the target did move
 
 
