@@ -90,3 +90,6 @@ def test_toml_can_be_used_and_json_holds_the_curve(folder: Path, capsys: pytest.
     with pytest.raises(UserError, match="give --force"):
         tune(folder / "rec", output=folder / "tracker.toml")
     assert not list(folder.glob("*.part"))
+    for sensors, says in (("radio", "unknown sensor 'radio'"), (",", "names no sensor")):
+        with pytest.raises(UserError, match=says):
+            tune(folder / "rec", sensors=sensors)

@@ -59,10 +59,7 @@ def track(
     """
     check_output(output, force, inputs=[rec, config])
     recording = read_recording(rec)
-    ids = [s.strip() for s in sensors.split(",") if s.strip()] if sensors is not None else None
-    if ids == []:
-        raise UserError("--sensors names no sensor; give ids separated by commas")
-    selected(recording, ids)
+    ids = sensor_ids(recording, sensors)
     source = config if config is not None else (rec / BESIDE if (rec / BESIDE).is_file() else None)
     known = [s.id for s in recording.sensors]
     settings = TrackerConfig() if source is None else read_tracker_config(source, known)
@@ -88,6 +85,15 @@ def track(
             f"wrote {output}: {counts['tracks']} tracks, {counts['rows']} rows, from {counts['reports']} reports "
             f"in {results.summary['seconds']:.2f} s"
         )
+
+
+def sensor_ids(recording: Recording, sensors: str | None) -> list[str] | None:
+    """Return the ids that --sensors names, None for all; raises UserError for none or one that is unknown."""
+    ids = [s.strip() for s in sensors.split(",") if s.strip()] if sensors is not None else None
+    if ids == []:
+        raise UserError("--sensors names no sensor; give ids separated by commas")
+    selected(recording, ids)
+    return ids
 
 
 def track_recording(recording: Recording, config: TrackerConfig, sensors: list[str] | None = None) -> Results:

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from boresight.cli.output import print_json, print_table
-from boresight.cli.track import BESIDE, track_recording
+from boresight.cli.track import BESIDE, sensor_ids, track_recording
 from boresight.config.tracker import read_tracker_config
 from boresight.errors import UserError
 from boresight.io.recording import read_recording
@@ -64,7 +64,7 @@ def tune(
             f"{output}: exists; give --force to replace it" if not output.is_dir() else f"{output}: a folder"
         )
     recording = read_recording(rec)
-    ids = [s.strip() for s in sensors.split(",") if s.strip()] if sensors is not None else None
+    ids = sensor_ids(recording, sensors)
     known = [s.id for s in recording.sensors]
     source = config if config is not None else (rec / BESIDE if (rec / BESIDE).is_file() else None)
     settings = TrackerConfig() if source is None else read_tracker_config(source, known)

@@ -100,9 +100,7 @@ def table(runs: int, seed: int) -> list[dict[str, Any]]:
         for first in range(0, runs, BLOCK):
             count = min(BLOCK, runs - first)
             data = [draw(truth[i], RADAR_DEG[i], count, rng) for i in range(2)]
-            smoothed, variance = _smooth(
-                np.stack([d.fused for d in data]), np.stack([d.sigma for d in data]), q
-            )
+            smoothed, variance = _smooth(np.stack([d.fused for d in data]), np.stack([d.sigma for d in data]), q)
             bound = np.sqrt(variance.mean(axis=1))
             for m, method in enumerate(METHODS):
                 for i in range(2):
