@@ -65,7 +65,7 @@ def covariance_intersection(x: Sequence[ArrayLike], P: Sequence[ArrayLike]) -> F
         C = np.asarray(p, dtype=np.float64)
         if not (np.linalg.eigvalsh(C) > 0).all():
             raise UserError("covariance intersection needs positive definite covariances")
-        informations.append(np.linalg.inv(C))
+        informations.append(np.asarray(np.linalg.inv(C)))
     J: FloatArray = informations[0]
     y: FloatArray = J @ means[0]
     for I2, m in zip(informations[1:], means[1:]):
