@@ -122,6 +122,26 @@ def test_mistakes_end_with_one_line(run: Run, words: tuple[object, ...], says: s
     assert not done.out
 
 
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [(b"\xff\xfe\x00", "not a CSV in UTF-8"), (b"east_m,north_m,up_m\n1,2,3,4\n", "line 2: more cells")],
+)
+def test_broken_csv_ends_with_one_line(run: Run, tmp_path: Path, content: bytes, says: str) -> None:
+    (tmp_path / "in.csv").write_bytes(content)
+    done = run("convert", "enu", "--csv", tmp_path / "in.csv", "--to", "azel")
+    assert done.code == 2
+    assert says in done.err
+    assert done.err.count("\n") == 1
+
+
+def test_json_of_a_csv_holds_numbers(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "in.csv").write_text("east_m,north_m,up_m,note\n3,4,0,a\n")
+    row = json.loads(run("convert", "enu", "--csv", tmp_path / "in.csv", "--to", "azel", "--json").out)["rows"][0]
+    assert row["east_m"] == 3.0
+    assert row["range_m"] == pytest.approx(5.0, rel=1e-15)
+    assert row["note"] == "a"
+
+
 def test_wang2009_json(run: Run, tmp_path: Path) -> None:
     picture = tmp_path / "w.png"
     done = run("paper", "wang2009", "--json", "--plot", picture)

@@ -141,7 +141,8 @@ def convert(
     if output is not None:
         _write(output, rows, force)
     elif json:
-        print_json("convert", {"from": source, "to": to}, rows)
+        numbers = [{k: float(v) if k in names else v for k, v in row.items()} for row in rows]
+        print_json("convert", {"from": source, "to": to}, numbers)
     elif len(rows) == 1:
         print_table({"what": "", "value": ""}, [{"what": k, "value": v} for k, v in rows[0].items()], digits=12)
     else:
@@ -191,6 +192,8 @@ def _rows(source: str, values: tuple[float, ...], path: Path | None) -> tuple[An
             rows = list(reader)
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise UserError(f"{path}: not a CSV in UTF-8 ({error})") from None
     used = [n for n in names if n in header]
     for name in names[:least]:
         if name not in header:
@@ -199,6 +202,9 @@ def _rows(source: str, values: tuple[float, ...], path: Path | None) -> tuple[An
             )
     if not rows:
         raise UserError(f"{path}: no rows")
+    for line, row in enumerate(rows, 2):
+        if None in row:
+            raise UserError(f"{path}, line {line}: more cells than the header's {len(header)}")
     table = np.array([[_number(row[n], path, i + 2, n) for n in used] for i, row in enumerate(rows)])
     return table, [{str(k): v for k, v in row.items()} for row in rows]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from boresight.cli.output import print_json, print_table
-from boresight.errors import UserError
+from boresight.cli.paper import check_runs
 
 COLUMNS = {
     "trajectory": "trajectory",
@@ -28,10 +28,7 @@ def mao2015(*, runs: int = 200, seed: int = 1, json: bool = False) -> None:
     """
     from boresight.papers.mao2015.table import table
 
-    if runs < 1:
-        raise UserError(f"--runs must be at least 1, not {runs}")
-    if seed < 0:
-        raise UserError(f"--seed must not be negative, not {seed}")
+    check_runs(runs, seed)
     rows = table(runs, seed)
     if json:
         print_json("paper mao2015", {"runs": runs, "seed": seed}, rows)
