@@ -26,6 +26,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "track": ("boresight.cli.track:track", "Track the targets of a recording."),
     "tune": ("boresight.cli.tune:tune", "Find process and measurement noise from a recording's innovations."),
     "score": ("boresight.cli.score:score_command", "Score tracks against the truth of their recording."),
+    "compare": ("boresight.cli.compare:compare", "Run several configurations on one recording, side by side."),
     "report": ("boresight.cli.report:report", "Write a page that shows what the tracker did."),
     "play": ("boresight.cli.play:play", "Replay tracks in the terminal, or as GIF, MP4 or PNG."),
     "info": ("boresight.cli.info:info", "Say what is in a recording."),
