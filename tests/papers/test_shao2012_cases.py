@@ -14,16 +14,16 @@ def rows(case: str, runs: int) -> dict[Any, dict[str, Any]]:
     return {(r["method"], r["time_s"]): r for r in CASES[case](runs, np.random.default_rng(1))}
 
 
-@pytest.mark.parametrize("runs", [60, pytest.param(300, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [60, pytest.param(500, marks=pytest.mark.slow)])
 def test_cases(runs: int) -> None:
     slack = 1.2 if runs == 60 else 1.0  # an RMS over 60 runs has a relative deviation of 9 %; two of them
     weave = rows("weave", runs)
     # range errors grow with the square of range, which differs by a factor of two between runs: one run in 500 with a
-    # target three sigma away can rule an RMS, so each error is also taken by that run's own bound
-    # the bound itself, averaged over the runs: 50 m give or take 3 % over 300
-    assert weave["msc", 5.0]["range_bound_m"] < 52.0 * slack
-    for at, most in ((5.0, 55.0), (8.0, 18.0)):
-        assert weave["msc", at]["range_m"] < most * slack
+    # target three sigma away rules the RMS at 5 s (52 m; 45 to 50 m without it), so each error is taken by that run's
+    # own bound; the bound itself, averaged over the runs, is good to some 3 %
+    assert weave["msc", 5.0]["range_bound_m"] < 50.0 * slack
+    assert weave["msc", 8.0]["range_m"] < 18.0 * slack
+    for at in (5.0, 8.0):
         assert weave["msc", at]["range_over_bound"] < 1.05 * slack
     assert weave["msc", 8.0]["range_observable"] == 1.0
     straight = rows("straight", runs)
