@@ -18,7 +18,8 @@ J2 = 1.08262668e-3
 EARTH_RATE = 7.2921150e-5  # rad/s
 EQUATOR = 6378137.0  # m
 LONGEST = 10.0  # s, of one step of the integration
-DIRECTION, POSITION = 0, 1  # what a report holds: azimuth, elevation, range (NaN: none) in its axes; or ECEF x, y, z
+# What a report holds: azimuth, elevation, range (NaN: none) in its axes; ECEF x, y, z; these and maybe a velocity.
+DIRECTION, POSITION, TRACK = 0, 1, 2
 ORBIT, ACCELERATION = 0, 1  # dynamics
 
 
@@ -95,29 +96,58 @@ def noise(dynamics: int, q: float, dt: float, i: int, j: int) -> float:
     return q * dt**n / (n * (2.0 if i == 0 else 1.0) * (2.0 if j == 0 else 1.0))
 
 
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def carry(m: int, F: FloatArray, P: FloatArray, W: FloatArray) -> None:
+    """Set the block (m, m) of `P` to F P F'; call it with `m` a constant, so that the compiler unrolls its loops.
+
+    `W` (2m, >= m) is work space.
+    """
+    for i in range(m):
+        for j in range(m):
+            W[j, i] = F[i, j]
+    for i in range(m):  # P F'
+        for j in range(m):
+            W[m + i, j] = 0.0
+        for k in range(m):
+            a = P[i, k]
+            for j in range(m):
+                W[m + i, j] += a * W[k, j]
+    for i in range(m):
+        for j in range(m):
+            P[i, j] = 0.0
+        for k in range(m):
+            a = F[i, k]
+            for j in range(m):
+                P[i, j] += a * W[m + k, j]
+    for i in range(m):
+        for j in range(i):
+            P[i, j] = P[j, i]
+
+
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def predict(x: FloatArray, P: FloatArray, dynamics: int, q: float, dt: float, F: FloatArray, W: FloatArray) -> None:
-    """Advance state (n,) and covariance (n, n) in place by `dt` >= 0; `F` (m, m) and `W` (m, n) are work space."""
-    m, n = len(F), len(x)
+def predict(
+    x: FloatArray, P: FloatArray, n: int, dynamics: int, q: float, dt: float, F: FloatArray, W: FloatArray
+) -> None:
+    """Advance the first `n` of a state and covariance in place by `dt` >= 0; `F` (m, m), `W` (2m, n) are work space."""
+    m = len(F)
     advance(x, dynamics, dt, F)
-    for i in range(m):
-        for j in range(n):
+    if m == 6:
+        carry(6, F, P, W)
+    else:
+        carry(9, F, P, W)
+    for j in range(m, n):
+        for i in range(m):
+            W[i, 0] = P[i, j]
+        for i in range(m):
             total = 0.0
             for k in range(m):
-                total += F[i, k] * P[k, j]
-            W[i, j] = total
-    for i in range(m):
-        for j in range(i, m):
-            total = 0.0
-            for k in range(m):
-                total += W[i, k] * F[j, k]
+                total += F[i, k] * W[k, 0]
             P[i, j] = P[j, i] = total
-        for j in range(m, n):
-            P[i, j] = P[j, i] = W[i, j]
-    for axis in range(3):
-        for i in range(m // 3):
-            for j in range(m // 3):
-                P[3 * i + axis, 3 * j + axis] += noise(dynamics, q, dt, i, j)
+    for i in range(m // 3):
+        for j in range(m // 3):
+            a = noise(dynamics, q, dt, i, j)
+            for axis in range(3):
+                P[3 * i + axis, 3 * j + axis] += a
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
@@ -143,49 +173,89 @@ def spin(t: float, a: FloatArray, out: FloatArray) -> None:
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def compare(
-    p: FloatArray, kind: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray,
-    y: FloatArray, A: FloatArray, s: FloatArray, u: FloatArray,
+def look_at(
+    kind: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray, sigma: FloatArray, scale: float,
+    look: FloatArray, R: FloatArray,
 ) -> int:  # fmt: skip
-    """Fill innovation `y` (3,) and Jacobian `A` (3, 3) against an inertial position `p` (3,); return the dimension.
+    """Turn a report to the inertial frame, once for all hypotheses: `look` (7,), covariance `R` (6, 6); the dimension.
+
+    A direction: where from, the unit vector there, range (m, NaN: none); `R` is diagonal, across (rad²) and along (m²).
+    A position or track: position, velocity; `R` is sigma² axes axes' (both turned to the inertial frame).
+    """
+    c, s = math.cos(EARTH_RATE * t), math.sin(EARTH_RATE * t)
+    a = sigma[0] * sigma[0] * scale
+    if kind == DIRECTION:
+        look[0], look[1], look[2] = c * origin[0] - s * origin[1], s * origin[0] + c * origin[1], origin[2]
+        ce = math.cos(z[1])
+        w0, w1, w2 = ce * math.sin(z[0]), ce * math.cos(z[0]), math.sin(z[1])
+        u0 = axes[0, 0] * w0 + axes[0, 1] * w1 + axes[0, 2] * w2
+        u1 = axes[1, 0] * w0 + axes[1, 1] * w1 + axes[1, 2] * w2
+        look[3], look[4] = c * u0 - s * u1, s * u0 + c * u1
+        look[5] = axes[2, 0] * w0 + axes[2, 1] * w1 + axes[2, 2] * w2
+        look[6] = z[2]
+        for i in range(3):
+            for j in range(3):
+                R[i, j] = 0.0
+        R[0, 0] = R[1, 1] = a
+        R[2, 2] = sigma[1] * sigma[1] * scale
+        return 2 if math.isnan(z[2]) else 3
+    look[0], look[1], look[2] = c * z[0] - s * z[1], s * z[0] + c * z[1], z[2]
+    k = 3
+    if kind == TRACK and len(z) > 3:
+        k = 6
+        look[3], look[4] = c * z[3] - s * z[4] - EARTH_RATE * look[1], s * z[3] + c * z[4] + EARTH_RATE * look[0]
+        look[5] = z[5]
+    for i in range(k):
+        for j in range(i, k):
+            total = 0.0
+            for b in range(k):
+                total += axes[i, b] * axes[j, b]
+            R[i, j] = R[j, i] = total * a
+    for first in range(0, k, 3):
+        for j in range(k):
+            x, y = R[first, j], R[first + 1, j]
+            R[first, j], R[first + 1, j] = c * x - s * y, s * x + c * y
+    for first in range(0, k, 3):
+        for i in range(k):
+            x, y = R[i, first], R[i, first + 1]
+            R[i, first], R[i, first + 1] = c * x - s * y, s * x + c * y
+    return k
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def compare(p: FloatArray, v: FloatArray, kind: int, k: int, look: FloatArray, y: FloatArray, A: FloatArray) -> None:
+    """Fill innovation `y` (k,) and Jacobian `A` (3, 3) by position, at an inertial position and velocity (3,).
 
     A direction is compared across the predicted line of sight (two small angles), so that no pole is special.
-    `s`, `u` (3,) are work space.
+    Rows of `y` beyond the third are velocities, whose Jacobian is one.
     """
-    if kind == POSITION:
-        spin(t, z, s)
+    if kind != DIRECTION:
         for i in range(3):
-            y[i] = s[i] - p[i]
+            y[i] = look[i] - p[i]
             for j in range(3):
                 A[i, j] = 1.0 if i == j else 0.0
-        return 3
-    spin(t, origin, s)
-    d0, d1, d2 = p[0] - s[0], p[1] - s[1], p[2] - s[2]
+            if k > 3:
+                y[3 + i] = look[3 + i] - v[i]
+        return
+    d0, d1, d2 = p[0] - look[0], p[1] - look[1], p[2] - look[2]
     r = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
     e0, e1, e2 = d0 / r, d1 / r, d2 / r
-    ce = math.cos(z[1])
-    w0, w1, w2 = ce * math.sin(z[0]), ce * math.cos(z[0]), math.sin(z[1])
-    for i in range(3):
-        u[i] = axes[i, 0] * w0 + axes[i, 1] * w1 + axes[i, 2] * w2
-    spin(t, u, s)
     # two unit vectors across the line of sight
     if abs(e2) < 0.9:
-        k = 1.0 / math.sqrt(e0 * e0 + e1 * e1)
-        f0, f1, f2 = -e1 * k, e0 * k, 0.0
+        q = 1.0 / math.sqrt(e0 * e0 + e1 * e1)
+        f0, f1, f2 = -e1 * q, e0 * q, 0.0
     else:
-        k = 1.0 / math.sqrt(e1 * e1 + e2 * e2)
-        f0, f1, f2 = 0.0, -e2 * k, e1 * k
+        q = 1.0 / math.sqrt(e1 * e1 + e2 * e2)
+        f0, f1, f2 = 0.0, -e2 * q, e1 * q
     g0, g1, g2 = e1 * f2 - e2 * f1, e2 * f0 - e0 * f2, e0 * f1 - e1 * f0
-    a = f0 * s[0] + f1 * s[1] + f2 * s[2]
-    b = g0 * s[0] + g1 * s[1] + g2 * s[2]
-    along = e0 * s[0] + e1 * s[1] + e2 * s[2]
+    a = f0 * look[3] + f1 * look[4] + f2 * look[5]
+    b = g0 * look[3] + g1 * look[4] + g2 * look[5]
+    along = e0 * look[3] + e1 * look[4] + e2 * look[5]
     across = math.sqrt(a * a + b * b)
-    k = math.atan2(across, along) / across if across > 1e-12 else 1.0
-    y[0], y[1] = k * a, k * b
+    q = math.atan2(across, along) / across if across > 1e-12 else 1.0
+    y[0], y[1] = q * a, q * b
     A[0, 0], A[0, 1], A[0, 2] = f0 / r, f1 / r, f2 / r
     A[1, 0], A[1, 1], A[1, 2] = g0 / r, g1 / r, g2 / r
-    if math.isnan(z[2]):
-        return 2
-    y[2] = z[2] - r
-    A[2, 0], A[2, 1], A[2, 2] = e0, e1, e2
-    return 3
+    if k == 3:
+        y[2] = look[6] - r
+        A[2, 0], A[2, 1], A[2, 2] = e0, e1, e2

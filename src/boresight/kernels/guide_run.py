@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from boresight.kernels.guide import ACCELERATION, DIRECTION, EARTH_RATE, ORBIT, advance, spin
+from boresight.kernels.guide import ACCELERATION, EARTH_RATE, ORBIT, TRACK, advance, look_at, spin
 from boresight.kernels.guide_update import Work, bring_to, report_position, start, update, work_space
 from boresight.types.sensor import FloatArray
 
@@ -43,41 +43,24 @@ def step(
     _bring_all(clock, X, P, L, dynamics, q, t, work)
     if t < clock[C_TIME] - settings[S_MAX_AGE]:
         return STALE
-    R = np.empty(3)
-    a = sigma[0] ** 2 * scale[source]
-    R[0] = R[1] = a
-    R[2] = a if kind != DIRECTION else sigma[1] ** 2 * scale[source]
-    best = int(clock[C_BEST])
+    k = look_at(kind, t, z, origin, axes, sigma, scale[source], work[4], work[12])
+    best, m, lag = int(clock[C_BEST]), X.shape[1] - 3, t - clock[C_TIME]
     fate = REJECTED
-    nis, share, k = 0.0, 0.0, 2
+    nis, share = 0.0, 0.0
     for h in range(len(X)):
         if L[h] <= RESTING:
             continue
-        e, l, d, s = update(
-            X[h],
-            P[h],
-            t - clock[C_TIME],
-            h == source + 1,
-            dynamics,
-            q,
-            kind,
-            t,
-            z,
-            origin,
-            axes,
-            R,
-            settings[S_GATE],
-            work,
-        )
+        n = m if h == 0 else m + 3
+        e, l, s = update(X[h], P[h], n, lag, h == source + 1, dynamics, q, kind, k, settings[S_GATE], work)
         L[h] += l
         if h == best:
-            nis, k, share = e, d, s
+            nis, share = e, s
             fate = ACCEPTED if e <= settings[S_GATE] else REJECTED
     _weigh(clock, L)
     if fate == ACCEPTED:
-        # the noise explains `share` of S: learn only as much of the surprise
-        gain = settings[S_FORGET] * share
-        scale[source] = min(max(scale[source] * (1.0 + gain * (nis / k - 1.0)), 0.1), 100.0)
+        # the noise explains `share` of S: learn only as much of the surprise; a track is never better than it says
+        gain, least = settings[S_FORGET] * share, (1.0 if kind == TRACK else 0.1)
+        scale[source] = min(max(scale[source] * (1.0 + gain * (nis / k - 1.0)), least), 100.0)
         clock[C_REJECTED] = max(clock[C_REJECTED] - 1.0, 0.0)
         run_of[source] = 0.0
     else:
@@ -117,12 +100,12 @@ def _bring_all(
     clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, dynamics: int, q: float, t: float, work: Work,
 ) -> None:  # fmt: skip
     """Advance the hypotheses that do not rest to `t`, if that is later."""
-    now = clock[C_TIME]
-    for h in range(len(X)):
-        if L[h] > RESTING:
-            clock[C_TIME] = now
-            bring_to(clock, X[h : h + 1], P[h : h + 1], dynamics, q, t, work)
-    clock[C_TIME] = max(now, t)
+    m = X.shape[1] - 3
+    if t > clock[C_TIME]:
+        for h in range(len(X)):
+            if L[h] > RESTING:
+                bring_to(X[h], P[h], m if h == 0 else m + 3, clock[C_TIME], dynamics, q, t, work)
+        clock[C_TIME] = t
     clock[C_COUNT] += 1.0
 
 
@@ -171,12 +154,10 @@ def predict_to(
     m = X.shape[1] - 3
     x = X[best].copy()
     C = P[best].copy()
-    one, many, cov = np.array([clock[C_TIME]]), x.reshape(1, -1), C.reshape(1, m + 3, m + 3)
     if t >= clock[C_TIME]:
-        bring_to(one, many, cov, dynamics, q, t, work)
+        bring_to(x, C, m, clock[C_TIME], dynamics, q, t, work)
     else:
-        F = np.empty((m, m))
-        advance(x, dynamics, t - clock[C_TIME], F)
+        advance(x, dynamics, t - clock[C_TIME], work[5])
     c, s = math.cos(EARTH_RATE * t), math.sin(EARTH_RATE * t)
     position[0], position[1], position[2] = c * x[0] + s * x[1], c * x[1] - s * x[0], x[2]
     velocity[0] = c * x[3] + s * x[4] + EARTH_RATE * position[1]

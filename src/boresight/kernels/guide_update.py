@@ -7,10 +7,11 @@ import math
 import numpy as np
 from numba import njit
 
-from boresight.kernels.guide import POSITION, advance, compare, motion_axes, noise, predict
+from boresight.kernels.guide import DIRECTION, LONGEST, advance, compare, motion_axes, noise, predict
 from boresight.types.sensor import FloatArray
 
 Work = tuple[FloatArray, ...]
+LOG_TURN = math.log(2.0 * math.pi)
 CLIP = 30.0  # NIS beyond which a report says no more about a hypothesis than that it does not fit
 
 
@@ -19,76 +20,34 @@ def work_space(n: int) -> Work:
     """Return the arrays in which `update` and `bring_to` work, for states of size n."""
     m = n - 3
     return (
-        np.zeros(n), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((m, m)), np.zeros((3, 3)),
-        np.zeros((3, 3)), np.zeros((3, n)), np.zeros((n, 3)), np.zeros((3, 3)), np.zeros((m, n)),
+        np.zeros(n), np.zeros(3), np.zeros(3), np.zeros(6), np.zeros(7), np.zeros((m, m)), np.zeros((3, 3)),
+        np.zeros((3, 3)), np.zeros((6, n)), np.zeros((6, n)), np.zeros((6, 6)), np.zeros((2 * m, n)), np.zeros((6, 6)),
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def update(
-    x: FloatArray, P: FloatArray, lag: float, biased: bool, dynamics: int, q: float, kind: int, t: float,
-    z: FloatArray, origin: FloatArray, axes: FloatArray, R: FloatArray, gate: float, work: Work,
-) -> tuple[float, float, int, float]:  # fmt: skip
-    """Condition a state on a report that is valid `lag` (s, <= 0) from the state's time; in place.
-
-    The state is carried back to the report's time t, compared there, and the Jacobian carried forth: exact without
-    process noise, which is added to R (3,) for the lag. Returns NIS, log-likelihood (NIS clipped), dimension and the
-    share of R in S (what an adaptive noise may learn from); the state is left alone beyond `gate`.
-    """
-    n = len(x)
-    m = n - 3
-    then, p, y, a3, b3, F, B, A, H, G, S, _ = work
-    then[:] = x
-    advance(then, dynamics, lag, F)
-    p[0], p[1], p[2] = then[0], then[1], then[2]
-    if biased:
-        motion_axes(then, B)
-        for i in range(3):
-            p[i] += B[i, 0] * x[m] + B[i, 1] * x[m + 1] + B[i, 2] * x[m + 2]
-    k = compare(p, kind, t, z, origin, axes, y, A, a3, b3)
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def spread(n: int, P: FloatArray, H: FloatArray, R: FloatArray, k: int, G: FloatArray, S: FloatArray) -> None:
+    """Fill `G` (k, n) with H P and `S` (k, k) with H P H' + R; call it with `n` a constant."""
     for i in range(k):
-        for j in range(m, n):
-            H[i, j] = 0.0
-        for j in range(m):
-            H[i, j] = A[i, 0] * F[0, j] + A[i, 1] * F[1, j] + A[i, 2] * F[2, j]
-        if biased:
-            for j in range(3):
-                H[i, m + j] = A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j]
-    for i in range(n):
-        for j in range(k):
-            total = 0.0
-            for c in range(n):
-                total += P[i, c] * H[j, c]
-            G[i, j] = total
-    late = noise(dynamics, q, abs(lag), 0, 0)
-    share = 0.0
+        for j in range(n):
+            G[i, j] = 0.0
+        for c in range(n):
+            a = H[i, c]
+            for j in range(n):
+                G[i, j] += a * P[c, j]
     for i in range(k):
-        for j in range(k):
-            total = late * (A[i, 0] * A[j, 0] + A[i, 1] * A[j, 1] + A[i, 2] * A[j, 2])
+        for j in range(i, k):
+            total = R[i, j]
             for c in range(n):
-                total += H[i, c] * G[c, j]
-            S[i, j] = total
-        S[i, i] += R[i]
-        share += R[i] / S[i, i] / k
-    nis, log_det = _whiten(S, y, G, k)
-    log_likelihood = -0.5 * (min(nis, CLIP) + log_det + k * math.log(2.0 * math.pi))
-    if nis > gate:
-        return nis, log_likelihood, k, share
-    # after whitening: x += G y, P -= G G'
-    for i in range(n):
-        for j in range(k):
-            x[i] += G[i, j] * y[j]
-        for j in range(i, n):
-            total = P[i, j]
-            for c in range(k):
-                total -= G[i, c] * G[j, c]
-            P[i, j] = P[j, i] = total
-    return nis, log_likelihood, k, share
+                total += G[i, c] * H[j, c]
+            S[i, j] = S[j, i] = total
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def _whiten(S: FloatArray, y: FloatArray, G: FloatArray, k: int) -> tuple[float, float]:
-    """Turn `y` to L⁻¹ y and `G` to G L⁻ᵀ in place, S = L L'; return y'S⁻¹y and log det S."""
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def condition(
+    n: int, x: FloatArray, P: FloatArray, S: FloatArray, y: FloatArray, G: FloatArray, k: int, gate: float
+) -> tuple[float, float]:
+    """Whiten `y` and `G` by S = L L'; then x += G'y, P -= G'G, unless the NIS is beyond `gate`; NIS, log det S."""
     log_det, nis = 0.0, 0.0
     for j in range(k):
         d = S[j, j]
@@ -104,30 +63,113 @@ def _whiten(S: FloatArray, y: FloatArray, G: FloatArray, k: int) -> tuple[float,
             S[i, j] = total / d
         for c in range(j):
             y[j] -= S[j, c] * y[c]
+            for i in range(n):
+                G[j, i] -= S[j, c] * G[c, i]
         y[j] /= d
+        for i in range(n):
+            G[j, i] /= d
         nis += y[j] * y[j]
-        for i in range(len(G)):
-            total = G[i, j]
-            for c in range(j):
-                total -= S[j, c] * G[i, c]
-            G[i, j] = total / d
+    if nis > gate:
+        return nis, log_det
+    for j in range(k):
+        for i in range(n):
+            x[i] += G[j, i] * y[j]
+        for i in range(n):
+            a = G[j, i]
+            for c in range(n):
+                P[i, c] -= a * G[j, c]
     return nis, log_det
 
 
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def update(
+    x: FloatArray, P: FloatArray, n: int, lag: float, biased: bool, dynamics: int, q: float, kind: int, k: int,
+    gate: float, work: Work,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Condition the first `n` of a state on a report (`look`, `R` of `look_at`, in `work`), in place.
+
+    The report is valid `lag` (s, <= 0) from the state's time: the state is carried back, compared there, and the
+    Jacobian carried forth: exact without process noise, which is added to R for the lag. Returns NIS, log-likelihood
+    (NIS clipped) and the share of R in S (what an adaptive noise may learn from). Beyond `gate` the state is left alone.
+    """
+    then, p, v, y, look, F, B, A, H, G, S, _, R = work
+    m = len(F)
+    then[:n] = x[:n]
+    advance(then, dynamics, lag, F)
+    for i in range(3):
+        p[i], v[i] = then[i], then[3 + i]
+    if biased:
+        motion_axes(then, B)
+        for i in range(3):
+            p[i] += B[i, 0] * x[m] + B[i, 1] * x[m + 1] + B[i, 2] * x[m + 2]
+    compare(p, v, kind, k, look, y, A)
+    _jacobian(A, F, B, biased, n, k, lag == 0.0, H)
+    if n == 6:
+        spread(6, P, H, R, k, G, S)
+    elif n == 9:
+        spread(9, P, H, R, k, G, S)
+    else:
+        spread(12, P, H, R, k, G, S)
+    share = 0.0
+    if lag < 0.0:
+        _late(S, A, dynamics, q, -lag, k)
+    for i in range(k):
+        share += R[i, i] / S[i, i] / k
+    if n == 6:
+        nis, log_det = condition(6, x, P, S, y, G, k, gate)
+    elif n == 9:
+        nis, log_det = condition(9, x, P, S, y, G, k, gate)
+    else:
+        nis, log_det = condition(12, x, P, S, y, G, k, gate)
+    return nis, -0.5 * (min(nis, CLIP) + log_det + k * LOG_TURN), share
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def _jacobian(
+    A: FloatArray, F: FloatArray, B: FloatArray, biased: bool, n: int, k: int, now: bool, H: FloatArray
+) -> None:
+    """Fill `H` (k, n) by the present state, of `A` (3, 3) by the position then and the transition `F` to then."""
+    m = len(F)
+    for i in range(min(k, 3)):
+        if now:
+            for j in range(m):
+                H[i, j] = A[i, j] if j < 3 else 0.0
+        else:
+            for j in range(m):
+                H[i, j] = A[i, 0] * F[0, j] + A[i, 1] * F[1, j] + A[i, 2] * F[2, j]
+        for j in range(m, n):
+            b = j - m
+            H[i, j] = A[i, 0] * B[0, b] + A[i, 1] * B[1, b] + A[i, 2] * B[2, b] if biased else 0.0
+    for i in range(3, k):
+        for j in range(m):
+            H[i, j] = F[i, j]
+        for j in range(m, n):
+            H[i, j] = 0.0
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def _late(S: FloatArray, A: FloatArray, dynamics: int, q: float, lag: float, k: int) -> None:
+    """Add the process noise of `lag` (s) to `S`: what moved the target since. Backwards its cross term is negative."""
+    pp = noise(dynamics, q, lag, 0, 0)
+    for i in range(min(k, 3)):
+        for j in range(min(k, 3)):
+            S[i, j] += pp * (A[i, 0] * A[j, 0] + A[i, 1] * A[j, 1] + A[i, 2] * A[j, 2])
+    if k > 3:
+        pv, vv = noise(dynamics, q, lag, 0, 1), noise(dynamics, q, lag, 1, 1)
+        for i in range(3):
+            S[i, 3 + i] -= pv
+            S[3 + i, i] -= pv
+            S[3 + i, 3 + i] += vv
+
+
 @njit(cache=True)
-def bring_to(clock: FloatArray, X: FloatArray, P: FloatArray, dynamics: int, q: float, t: float, work: Work) -> None:
-    """Advance every hypothesis (h, n) in place to time `t` (s) if that is later than `clock[0]`."""
-    dt = t - clock[0]
-    if dt <= 0.0:
-        return
-    F, W = work[5], work[11]
-    for h in range(len(X)):
-        left = dt
-        while left > 0.0:
-            step = min(left, 10.0)
-            predict(X[h], P[h], dynamics, q, step, F, W)
-            left -= step
-    clock[0] = t
+def bring_to(x: FloatArray, P: FloatArray, n: int, now: float, dynamics: int, q: float, t: float, work: Work) -> None:
+    """Advance the first `n` of a state, and its covariance, in place from `now` to time `t` (s) if that is later."""
+    left = t - now
+    while left > 0.0:
+        step = min(left, LONGEST)
+        predict(x, P, n, dynamics, q, step, work[5], work[11])
+        left -= step
 
 
 @njit(cache=True)
@@ -155,8 +197,8 @@ def start(
 @njit(cache=True)
 def report_position(kind: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray, out: FloatArray) -> bool:
     """Fill `out` (3,) with the report's position in ECEF; false if it has no range."""
-    if kind == POSITION:
-        out[:] = z
+    if kind != DIRECTION:
+        out[:] = z[:3]
         return True
     if math.isnan(z[2]):
         return False
