@@ -11,7 +11,7 @@ import numpy as np
 from boresight.frames.local import ecef_from_enu_rotation
 from boresight.pointing.guide import GuideFilter, GuideSource
 from boresight.pointing.pointer import Pointer
-from boresight.service.feed import LONGEST, Feed, origins
+from boresight.service.feed import LONGEST, Feed, Stand
 from boresight.types import Site
 
 SITE = Site(0.8, 0.15, 400.0)
@@ -27,7 +27,7 @@ PLACE = {"source": "gps", "t_s": 1000.0, "latitude_deg": 45.9, "longitude_deg": 
 
 
 def feed() -> Feed:
-    return Feed(POINTER, origins(SITE, {"radar": (0.0, 0.0, 0.0), "gps": (0.0, 0.0, 0.0)}))
+    return Feed(POINTER, {"radar": Stand(), "gps": Stand()})
 
 
 def line(**change: object) -> bytes:

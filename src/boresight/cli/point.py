@@ -55,8 +55,6 @@ def point(
 
     station = read_site(site)
     if replay is None:
-        if station.file.platform is not None:
-            raise UserError(f"{site}: platform goes with --replay: live there is no navigation data yet")
         from boresight.service.live import run_live
 
         if output is not None:
@@ -71,14 +69,12 @@ def point(
     from boresight.io.recording import read_recording
     from boresight.io.table import write_table
     from boresight.report.pointing import pointing_picture
-    from boresight.service.elements import Elements
     from boresight.service.replay import replay as run
 
     check_output(output, force)
     recording = read_recording(replay)
     chain = pointer_for(station, recording)
-    how = (station.file.beam.rate_hz, station.file.platform, Elements(chain, station.elements))
-    pointings = [p for p, _ in run(chain, recording, *how)]
+    pointings = [p for p, _ in run(station, site.parent, chain, recording)]
     if not pointings:
         raise UserError(f"{replay}: no report with a range or a position: nothing to point at")
     with output_folder(output, force) as folder:

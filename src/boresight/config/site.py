@@ -65,7 +65,10 @@ class DynamicsTable(TableModel, frozen=True):
 
 
 class SourceTable(TableModel, frozen=True):
-    """`[[source]]`: a guide source or own tracking; with `tle` (a file beside this one) an orbit's elements."""
+    """`[[source]]`: a guide source or own tracking; with `tle` (a file beside this one) an orbit's elements.
+
+    With `correlation_s` it is another tracker's track; `tracks` is a folder with its tracks.parquet, for a replay.
+    """
 
     id: str
     own: bool = False
@@ -73,7 +76,13 @@ class SourceTable(TableModel, frozen=True):
     sigma_range_m: float = 0.0
     sigma_position_m: float = 0.0
     sigma_bias_m: float = 0.0
+    correlation_s: float | None = None
+    sigma_up_m: float = 10.0
+    tracks: str | None = None
+    track_id: int | None = None
+    axes: Literal["site_enu", "platform_enu", "body"] = "site_enu"
     offset_enu_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    lever_arm_frd_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tle: str | None = None
     satellite: str | None = None
 
@@ -108,6 +117,7 @@ class SiteFile(TableModel, frozen=True):
     choice: Literal["auto", "guide", "own"] = "auto"
     stale_s: float = 3.0
     platform: str | None = None
+    attitude_coast_s: float = 1.0
     source: tuple[SourceTable, ...] = ()
     input: InputTable = InputTable()
     output: OutputTable = OutputTable()
@@ -130,12 +140,25 @@ def read_site(path: Path) -> Station:
         raise UserError(f"{path}: site.latitude_deg = {s.latitude_deg:g} must lie between -90 and 90")
     if not (file.beam.rate_hz > 0 and file.beam.width_deg > 0 and file.output.command_rate_hz > 0):
         raise UserError(f"{path}: beam.rate_hz, beam.width_deg and output.command_rate_hz must be above zero")
+    if not file.attitude_coast_s >= 0:
+        raise UserError(f"{path}: attitude_coast_s = {file.attitude_coast_s:g} must not be negative")
+    for one in file.source:
+        _check_source(one, path, file.platform)
     mount = Mount(
         (m.azimuth_deg[0] * DEG, m.azimuth_deg[1] * DEG), (m.elevation_deg[0] * DEG, m.elevation_deg[1] * DEG),
         m.azimuth_rate_deg_s * DEG, m.elevation_rate_deg_s * DEG, tuple((a * DEG, e * DEG) for a, e in m.horizon_deg),
     )  # fmt: skip
     elements = {one.id: _satellite(one, path) for one in file.source if one.tle is not None}
     return Station(file, Site(s.latitude_deg * DEG, s.longitude_deg * DEG, s.height_m), mount, elements)
+
+
+def _check_source(one: SourceTable, path: Path, platform: str | None) -> None:
+    if platform is None and (one.axes != "site_enu" or any(one.lever_arm_frd_m)):
+        raise UserError(f"{path}: source '{one.id}': axes and lever_arm_frd_m go with platform = \"…\" of the file")
+    if one.correlation_s is None and (one.tracks is not None or one.track_id is not None):
+        raise UserError(f"{path}: source '{one.id}': tracks go with correlation_s, over which their errors resemble")
+    if not one.sigma_up_m > 0:
+        raise UserError(f"{path}: source '{one.id}': sigma_up_m must be above zero")
 
 
 def _satellite(source: SourceTable, path: Path) -> Satellite:
@@ -161,10 +184,10 @@ def pointer_for(station: Station, recording: Recording | None = None) -> Pointer
     else:
         known = [s.id for s in recording.sensors]
         for name in named:
-            if name not in known and name not in station.elements:
+            if name not in known and name not in station.elements and named[name].tracks is None:
                 raise UserError(f"source '{name}' is not in the recording{did_you_mean(name, known)}")
         sources = [_source(named[s.id]) if s.id in named else _declared(s) for s in recording.sensors]
-        sources += [_source(s) for s in file.source if s.id in station.elements and s.id not in known]
+        sources += [_source(s) for s in file.source if s.id not in known]
     if not sources:
         raise UserError("the site file has no [[source]]: say who reports")
     orbit = file.dynamics.kind == "orbit"
@@ -185,7 +208,9 @@ def pointer_for(station: Station, recording: Recording | None = None) -> Pointer
 
 
 def _source(s: SourceTable) -> GuideSource:
-    return GuideSource(s.id, s.sigma_angle_deg * DEG, s.sigma_range_m, s.sigma_position_m, s.sigma_bias_m)
+    return GuideSource(
+        s.id, s.sigma_angle_deg * DEG, s.sigma_range_m, s.sigma_position_m, s.sigma_bias_m, s.correlation_s
+    )
 
 
 def _declared(s: Sensor) -> GuideSource:

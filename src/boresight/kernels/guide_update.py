@@ -90,7 +90,7 @@ def update(
 
     The report is valid `lag` (s, <= 0) from the state's time: the state is carried back, compared there, and the
     Jacobian carried forth: exact without process noise, which is added to R for the lag. Returns NIS, log-likelihood
-    (NIS clipped) and the share of R in S (what an adaptive noise may learn from). Beyond `gate` the state is left alone.
+    (NIS clipped) and the share of R in S (what an adaptive noise may learn from). Beyond `gate` the state stays.
     """
     then, p, v, y, look, F, B, A, H, G, S, _, R = work
     m = len(F)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -10,13 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from boresight.errors import UserError
 from boresight.kernels import guide_run as kernel
-from boresight.kernels.guide import DIRECTION, POSITION
+from boresight.kernels.guide import DIRECTION, POSITION, TRACK
 from boresight.kernels.guide_update import work_space
 from boresight.types.sensor import FloatArray
 
 Fates = NDArray[np.int64]
 NONE: FloatArray = np.zeros(3)
 EYE: FloatArray = np.eye(3)
+THINNED = 4  # the fate of a track that came within the correlation time of the last one taken
+# Looks a correlation time or more apart, each counted with this much of its covariance, are never counted for more
+# than they say: the rows of their correlation matrix, exp(-lag / time), add up to at most this.
+INFLATION = (1.0 + math.exp(-1.0)) / (1.0 - math.exp(-1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +30,9 @@ class GuideSource:
 
     `sigma_angle` (rad, across the line of sight) and `sigma_range` (m) for a source of directions, `sigma_position`
     (m per axis) for one of positions. `sigma_bias` (m) is the prior of a constant bias along, across and up of the
-    motion; 0: it has none (own tracking: the beam itself is the reference).
+    motion; 0: it has none (own tracking: the beam itself is the reference). `correlation` (s), instead of a sigma,
+    makes it another tracker's track: its reports bring their own covariance, and their errors resemble each other over
+    this time (at most exp(-lag / correlation); 0: they are independent).
     """
 
     id: str
@@ -33,24 +40,45 @@ class GuideSource:
     sigma_range: float = 0.0
     sigma_position: float = 0.0
     sigma_bias: float = 0.0
+    correlation: float | None = None
 
     def __post_init__(self) -> None:
-        if not (self.sigma_angle > 0) != (self.sigma_position > 0):
-            raise UserError(f"source '{self.id}': give either a sigma of its angles or one of its position, above zero")
+        if self.correlation is not None:
+            if not 0.0 <= self.correlation < math.inf:
+                raise UserError(f"source '{self.id}': the correlation time of a track must not be negative")
+            if self.sigma_angle or self.sigma_range or self.sigma_position:
+                raise UserError(f"source '{self.id}': a track brings its own covariance; leave its sigma out")
+        elif (self.sigma_angle > 0) == (self.sigma_position > 0):
+            raise UserError(
+                f"source '{self.id}': give either a sigma of its angles or one of its position, above "
+                "zero, or the correlation time of its errors if it is another tracker's track"
+            )
         if self.sigma_bias < 0 or self.sigma_range < 0:
             raise UserError(f"source '{self.id}': a sigma is negative")
 
     @property
     def kind(self) -> int:
-        """Whether its reports are directions or positions."""
+        """Whether its reports are directions, positions or tracks."""
+        if self.correlation is not None:
+            return TRACK
         return DIRECTION if self.sigma_angle > 0 else POSITION
 
     @property
     def sigma(self) -> FloatArray:
         """The pair (2,) that the kernels take."""
+        if self.correlation is not None:
+            return np.array([math.sqrt(INFLATION) if self.correlation > 0.0 else 1.0, 0.0])
         if self.kind == POSITION:
             return np.array([self.sigma_position, 0.0])
         return np.array([self.sigma_angle, self.sigma_range])
+
+    def axes_of(self, covariance: FloatArray) -> FloatArray:
+        """Return the `axes` (k, k) by which a position or track carries a covariance (k, k) (ECEF, m²) of its own.
+
+        Raises numpy.linalg.LinAlgError for one that is not positive definite.
+        """
+        root: FloatArray = np.linalg.cholesky(np.asarray(covariance, dtype=np.float64))
+        return root if self.correlation is not None else root / self.sigma_position
 
 
 class GuideState(NamedTuple):
@@ -62,6 +90,7 @@ class GuideState(NamedTuple):
     L: FloatArray
     scale: FloatArray  # (s,) learned factor on each source's variance
     run_of: FloatArray
+    looked: FloatArray  # (s,) s, validity of the last track taken of each source
     work: tuple[FloatArray, ...]
 
 
@@ -124,20 +153,30 @@ class GuideFilter:
         n, h = (9 if self.orbit else 12), 1 + len(self.sources)
         return GuideState(
             np.zeros(kernel.N_CLOCK), np.zeros((h, n)), np.zeros((h, n, n)), np.zeros(h), np.ones(h - 1),
-            np.zeros(h - 1), work_space(n),
+            np.zeros(h - 1), np.full(h - 1, -math.inf), work_space(n),
         )  # fmt: skip
 
     def step(
         self, state: GuideState, source: int, t: float, z: FloatArray, origin: FloatArray = NONE, axes: FloatArray = EYE
     ) -> int:
-        """Take in one report, in the state's own arrays; returns its fate (`kernels.guide_run`)."""
+        """Take in one report, in the state's own arrays; returns its fate (`kernels.guide_run`, or THINNED).
+
+        `z`: azimuth, elevation (rad), range (m or NaN) from `origin` in `axes` (ECEF m; rotation); or ECEF position
+        (m) with a covariance of sigma² axes axes'; or a track: position, or position and velocity (6,), with a
+        covariance of axes axes' (`GuideSource.axes_of`).
+        """
         s = self.sources[source]
-        return int(
+        if s.correlation is not None and abs(t - state.looked[source]) < s.correlation:
+            return THINNED
+        fate = int(
             kernel.step(
                 *state[:6], self._settings, np.array(self.spread), source, s.kind, t, z, origin, axes, s.sigma,
                 self._sigma_bias, state.work,
             )
         )  # fmt: skip
+        if fate == kernel.ACCEPTED:
+            state.looked[source] = t
+        return fate
 
     def predict(self, state: GuideState, t: float) -> Predicted | None:
         """Return the target at time `t` (s), or None before the start; the state is left alone."""
@@ -146,7 +185,12 @@ class GuideFilter:
         return out if ok else None
 
     def run(self, reports: Reports, node: ArrayLike, aim: ArrayLike) -> Run:
-        """Step through reports, predicting at each `node` (k,) (s) to its `aim` time (k,) from what had arrived."""
+        """Step through reports, predicting at each `node` (k,) (s) to its `aim` time (k,) from what had arrived.
+
+        Raises UserError if a source is another tracker's track: these are stepped one by one.
+        """
+        if any(s.correlation is not None for s in self.sources):
+            raise UserError("tracks of another tracker are thinned as they come: use step")
         node, aim = np.asarray(node, dtype=np.float64), np.asarray(aim, dtype=np.float64)
         state, k, n = self.init(), len(node), len(reports.t)
         sigma = np.stack([s.sigma for s in self.sources])[reports.source]
@@ -170,8 +214,8 @@ class GuideFilter:
 
 def snapshot(state: GuideState) -> GuideState:
     """Return a copy that later steps do not change."""
-    clock, X, P, L, scale, run_of = (a.copy() for a in state[:6])
-    return GuideState(clock, X, P, L, scale, run_of, state.work)
+    clock, X, P, L, scale, run_of, looked = (a.copy() for a in state[:7])
+    return GuideState(clock, X, P, L, scale, run_of, looked, state.work)
 
 
 def merged(reports: tuple[Reports, ...]) -> Reports:

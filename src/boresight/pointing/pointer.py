@@ -16,7 +16,7 @@ from boresight.frames.azel import azel_from_enu
 from boresight.frames.local import ecef_from_enu, ecef_from_enu_rotation
 from boresight.frames.tangent import direction_from_tangent
 from boresight.pointing.beam import Aim, aim_at
-from boresight.pointing.guide import EYE, NONE, GuideFilter, GuideState
+from boresight.pointing.guide import EYE, NONE, THINNED, GuideFilter, GuideState
 from boresight.types import Site
 from boresight.types.sensor import FloatArray
 
@@ -28,6 +28,7 @@ class Mode(StrEnum):
     OWN = "own"  # own tracking alone: no guide is fresh
     COAST = "coast"  # nobody is fresh: the prediction goes on, its covariance grows
     SEARCH = "search"  # the covariance has outgrown the beam: a spiral about the prediction
+    NO_ATTITUDE = "no_attitude"  # the platform's navigation is too old: face and mount angles are not known
 
 
 class Choice(StrEnum):
@@ -45,6 +46,8 @@ class Pointing(NamedTuple):
     t_aim: float  # s, when the beam will be there
     aim: Aim
     mode: Mode
+    mount_azimuth: float  # rad, in the axes the mount stands on: the platform's, or the site's
+    mount_elevation: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +99,7 @@ class Pointer:
         if not self.allowed(source):
             return -1
         fate = self.guide.step(state.guide, source, t, z, origin, axes)
-        if fate == 0:
+        if fate in (0, THINNED):
             if t - state.last[source] > self.stale:
                 state.since[source] = t
             state.last[source] = max(state.last[source], t)
@@ -105,14 +108,17 @@ class Pointer:
     def tick(self, state: PointerState, t: float, place: Place | None = None) -> tuple[PointerState, Pointing | None]:
         """Return the command at time `t` (s); None before the first report with a range.
 
-        `place` is the antenna's at the time it aims for, if it moves; angles are in the site's ENU.
+        `place` is the antenna's at the time it aims for, if it moves; azimuth and elevation are in the site's ENU, the
+        mount's in the platform's axes. With a place whose attitude is lost (NaN) the mode says so, and P(in beam), face
+        and mount angles are NaN.
         """
         predicted = self.guide.predict(state.guide, t + self.lead)
         if predicted is None:
             return state, None
         R, here, face = _geometry(self.site, self.face)
         if place is not None:
-            here, face = place.position, place.enu_from_face
+            here = place.position
+            face = face if math.isnan(place.enu_from_mount[0, 0]) else place.enu_from_face
         args = (face, self.pole, 0.5 * self.beam_width)
         to_target, velocity = (predicted.position - here) @ R, predicted.velocity @ R
         covariance = R.T @ predicted.covariance @ R
@@ -128,7 +134,14 @@ class Pointer:
             state = state._replace(mode=mode, search_begun=begun, searched=n)
         else:
             state = state._replace(mode=mode, searched=0)
-        return state, Pointing(t, t + self.lead, aim, mode)
+        if place is None:
+            return state, Pointing(t, t + self.lead, aim, mode, aim.azimuth, aim.elevation)
+        if math.isnan(place.enu_from_mount[0, 0]):
+            blind = aim._replace(face_azimuth=math.nan, face_elevation=math.nan, p_in_beam=math.nan)
+            return state, Pointing(t, t + self.lead, blind, Mode.NO_ATTITUDE, math.nan, math.nan)
+        on_board = (float(v) for v in unit_of(aim.azimuth, aim.elevation) @ place.enu_from_mount)
+        azimuth, elevation, _ = azel_from_enu(*on_board)
+        return state, Pointing(t, t + self.lead, aim, mode, azimuth, elevation)
 
     def ages(self, state: PointerState, t: float) -> FloatArray:
         """Return how old each source's last good report is (s), infinite before the first."""
@@ -152,6 +165,7 @@ class Place(NamedTuple):
 
     position: FloatArray  # (3,) ECEF m
     enu_from_face: FloatArray  # (3, 3)
+    enu_from_mount: FloatArray  # (3, 3) columns right, forward, up of the platform; NaN where the attitude is lost
 
 
 @lru_cache(maxsize=16)
@@ -169,6 +183,12 @@ class PointerState(NamedTuple):
     mode: Mode
     search_begun: float
     searched: int
+
+
+def unit_of(azimuth: float, elevation: float) -> FloatArray:
+    """Return the unit vector (3,) of an azimuth and elevation (rad)."""
+    c = math.cos(elevation)
+    return np.array([c * math.sin(azimuth), c * math.cos(azimuth), math.sin(elevation)])
 
 
 def _spiral(n: int, width: float, reach: float) -> FloatArray:

@@ -13,11 +13,14 @@ import msgspec
 
 from boresight.config.site import Station
 from boresight.errors import UserError
+from boresight.kernels.guide import DIRECTION
 from boresight.pointing.pointer import Pointer, PointerState, Pointing
 from boresight.service.elements import Elements
-from boresight.service.feed import PER_READ, Feed, origins
+from boresight.service.feed import PER_READ, Feed, Stand
+from boresight.service.navigation import Navigation
 from boresight.service.rotctld import Rotator
 from boresight.service.sockets import Broadcast, Input, Serial, Tcp, Udp, address
+from boresight.types import Axes
 
 POLL = 0.005  # s between looks at inputs that cannot be waited for
 
@@ -36,8 +39,9 @@ def run_live(
     """
     file = station.file
     inputs = _inputs(station)
-    offsets = {s.id: s.offset_enu_m for s in file.source}
-    feed = Feed(pointer, origins(station.site, offsets))
+    stands = {s.id: Stand(Axes(s.axes), s.offset_enu_m, s.lever_arm_frd_m) for s in file.source}
+    carrier = None if file.platform is None else Navigation(file.platform, pointer, file.attitude_coast_s)
+    feed = Feed(pointer, stands, carrier)
     out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM) if file.output.udp else None
     goal = address(file.output.udp, "output.udp") if file.output.udp else ("", 0)
     stream = Broadcast(file.output.tcp) if file.output.tcp else None
@@ -61,20 +65,20 @@ def run_live(
                 _wait(inputs, tick - now)
                 continue
             elements.report(state, now)
-            state, pointing = pointer.tick(state, now)
+            state, pointing = pointer.tick(state, now, None if carrier is None else carrier.place(now))
             if pointing is not None:
                 if out is not None:
                     out.sendto(encode(pointing), goal)
                 if stream is not None:
                     stream.send(encode(pointing))
                 if rotator is not None:
-                    rotator.follow(pointing.aim.azimuth, pointing.aim.elevation, now)
+                    rotator.follow(pointing.mount_azimuth, pointing.mount_elevation, now)
                 if not math.isnan(arrived):
                     latency = max(latency, clock() - arrived) if ticks else 0.0
                 ticks += 1
                 arrived = math.nan
             if status is not None and pointing is not None:
-                status.write("\r" + status_line(pointer, state, pointing, rotator))
+                status.write("\r" + status_line(pointer, state, pointing, rotator, carrier))
                 status.flush()
             tick = max(tick + 1.0 / file.beam.rate_hz, now)
     except KeyboardInterrupt:
@@ -102,12 +106,15 @@ def encode(p: Pointing) -> bytes:
     degrees = {
         "az_deg": a.azimuth, "el_deg": a.elevation, "face_az_deg": a.face_azimuth, "face_el_deg": a.face_elevation,
         "az_rate_deg_s": a.azimuth_rate, "el_rate_deg_s": a.elevation_rate, "sigma_deg": a.sigma,
+        "mount_az_deg": p.mount_azimuth, "mount_el_deg": p.mount_elevation,
     }  # fmt: skip
     row = {"t_s": p.t, "t_aim_s": p.t_aim, **{k: math.degrees(v) for k, v in degrees.items()}}
     return msgspec.json.encode({**row, "p_in_beam": a.p_in_beam, "mode": str(p.mode)}) + b"\n"
 
 
-def status_line(pointer: Pointer, state: PointerState, p: Pointing, rotator: Rotator | None) -> str:
+def status_line(
+    pointer: Pointer, state: PointerState, p: Pointing, rotator: Rotator | None, carrier: Navigation | None = None
+) -> str:
     """Return the line that says how it goes: mode, aim, error, each source's age and learned sigma factor."""
     ages = pointer.ages(state, p.t)
     sources = "  ".join(
@@ -119,7 +126,8 @@ def status_line(pointer: Pointer, state: PointerState, p: Pointing, rotator: Rot
     where = "" if rotator is None else ("  rotator away" if rotator.position is None else "  rotator on")
     aim = f"az {math.degrees(p.aim.azimuth):8.3f} el {math.degrees(p.aim.elevation):7.3f}"
     error = f"σ {math.degrees(p.aim.sigma):.3f}° P {p.aim.p_in_beam:.2f}"
-    return f"{p.mode:6s} {aim} {error}  {sources}{biased}{where}   "
+    turned = "" if carrier is None else f"  {carrier.name} {carrier.age(p.t):.1f}s"
+    return f"{p.mode:6s} {aim} {error}  {sources}{turned}{biased}{where}   "
 
 
 def _inputs(station: Station) -> list[Input]:
@@ -150,7 +158,7 @@ def _warm(pointer: Pointer) -> PointerState:
     scratch = pointer.init()
     here = np.array([7e6, 0.0, 0.0])
     for source, s in enumerate(pointer.guide.sources):
-        z = np.array([0.1, 0.2, 1e5]) if s.kind == 0 else here
+        z = np.array([0.1, 0.2, 1e5]) if s.kind == DIRECTION else here
         pointer.take(scratch, source, 0.0, z, here, np.eye(3))
         pointer.tick(scratch, 0.5)
     return pointer.init()

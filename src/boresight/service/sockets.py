@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import math
 import socket
 import struct
 import sys
+import time
 from typing import Any, Protocol
 
 from boresight.errors import UserError
 
 BUFFER = 1 << 16  # bytes kept of an unfinished line, then it is dropped
 CONNECTIONS = 32
+RETRY = 0.5  # s between attempts to open a serial port that has gone
 MEMINFO, DROPS = 55, 8  # Linux: SO_MEMINFO, and where in its nine numbers the drops stand
 
 
@@ -148,11 +151,15 @@ class Serial:
             raise UserError("input.serial needs pyserial: install boresight[serial]") from None
         self.port, self.baud, self.most, self.rest = port, baud, most, b""
         self.device: Any = None
-        self.lost = 0
+        self.lost, self.tried = 0, -math.inf
         if not self._open():
             raise UserError(f"input.serial = '{port}': cannot be opened")
 
     def _open(self) -> bool:
+        now = time.monotonic()
+        if now - self.tried < RETRY:
+            return False
+        self.tried = now
         try:
             self.device = self.serial.Serial(self.port, self.baud, timeout=0)
         except (OSError, ValueError):
@@ -169,8 +176,8 @@ class Serial:
             return []
         try:
             data = self.device.read(BUFFER)
-        except OSError:
-            self.device = None
+        except (OSError, TypeError):  # unplugged; pyserial's own error is an OSError, a port closed under it no number
+            self._unplugged()
             return []
         lines: list[bytes] = (self.rest + bytes(data)).split(b"\n")
         rest = lines.pop()
@@ -185,7 +192,15 @@ class Serial:
     def close(self) -> None:
         """Close the port."""
         if self.device is not None:
-            self.device.close()
+            with contextlib.suppress(OSError):
+                self.device.close()
+        self.device = None
+
+    def _unplugged(self) -> None:
+        """Give the port back, with the beginning of a line whose end will not come."""
+        self.close()
+        self.lost += bool(self.rest)
+        self.rest = b""
 
 
 class Broadcast:
