@@ -5,18 +5,22 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy import empty
 
 from boresight.errors import UserError
 from boresight.kernels.gaussian import joseph_update, sandwich
 from boresight.kernels.motion import move
+from boresight.kernels.space import MISFIT, predict_space, update_space
 from boresight.kernels.step import predict_step, update_step
 from boresight.models import check
 from boresight.models.base import KernelSensor
 from boresight.models.motion.base import KernelMotion
+from boresight.models.motion.cv import NearlyConstantVelocity
 from boresight.models.protocols import MeasurementModel, MotionModel
 from boresight.types.sensor import FloatArray
 from boresight.types.state import GaussianState, UpdateInfo
 
+SIX = (6, 6)
 NOTHING = "the measurement has no component that can be used: nothing measured, or zero range"
 
 
@@ -37,8 +41,15 @@ def predict(state: GaussianState, motion: MotionModel, t: float) -> GaussianStat
     Raises UserError where `t` is not finite or before the state's time: late reports are for `filters.late`.
     """
     dt = t - state.t
-    if not dt >= 0.0 or not math.isfinite(dt):
+    if not 0.0 <= dt < math.inf:
         raise UserError(f"cannot predict from t = {state.t!r} to t = {t!r}: time must not run backwards")
+    if type(motion) is NearlyConstantVelocity and motion.dimensions == 3:
+        x, P = empty(6), empty(SIX)
+        try:
+            if predict_space(state.x, state.P, dt, motion.q, x, P):
+                return GaussianState(float(t), x, P)
+        except TypeError:  # not contiguous float64: the way for all
+            pass
     if isinstance(motion, KernelMotion) and motion.kernel is move and len(state.x) == motion.state_dimension:
         return GaussianState(float(t), *predict_step(state.x, state.P, dt, motion.parameters))
     if isinstance(motion, KernelMotion):
@@ -62,6 +73,19 @@ def update(
     States from `n_estimated` on are considered (Schmidt): they widen the covariance but are not estimated.
     Raises UserError where the report holds no component that can be used, or S is not positive definite.
     """
+    if n_estimated is None and isinstance(sensor, KernelSensor) and sensor.separable:  # the straight-line kernel
+        columns = sensor.columns_measured
+        m = len(columns)
+        x, P, y, S = empty(6), empty(SIX), empty(m), empty((m, m))
+        try:
+            used, nis, log_likelihood = update_space(state.x, state.P, z, columns, sensor.context, x, P, y, S)
+        except TypeError:  # not contiguous float64: the way for all
+            used = MISFIT
+        if used > 0 and nis == nis:
+            if used < m:
+                m = int(used)
+                y, S = y[:m], S[:m, :m].copy()
+            return GaussianState(state.t, x, P), UpdateInfo(y, S, nis, log_likelihood)
     n = len(state.x) if n_estimated is None else n_estimated
     if isinstance(sensor, KernelSensor):
         x, P, y, S, nis, log_likelihood = update_step(state.x, state.P, sensor.columns(z), sensor.context, n)

@@ -1,0 +1,127 @@
+"""One track in one array: the filter of a single report, in place, and of a whole stream, from `kernels.blocks`.
+
+A packed belief is (29,): time, the motion model's q, then the 27 numbers of `blocks`. A packed report is (74,): time,
+the measured components by number (7, NaN where not measured), then the sensor's context as `kernels.observation` has
+it (66), of uncorrelated noise, in space, not in the tangent form: `filters.packed` checks that. Two arrays and no more,
+because unwrapping the arguments is most of what a call from Python costs.
+"""
+
+# Numba caches by file and compiles kernels.blocks and kernels.sight into these: clear __pycache__ when those change.
+from __future__ import annotations
+
+import math
+
+from numba import njit, types
+
+from boresight.kernels.arctan import FAST, INLINE, near
+from boresight.kernels.blocks import Nine, Six, Three, condition, condition_rate, load, move, store
+from boresight.kernels.observation import CONTEXT_SIZE, NOISE, POSITION, ROTATION, VELOCITY, IntArray
+from boresight.kernels.sight import polar, range_rate, turned_polar
+from boresight.kernels.signatures import MATRIX, VECTOR
+from boresight.types.sensor import FloatArray
+
+Conditioned = tuple[Three, Three, Six, Nine, Six, float]
+
+TIME, POWER, NUMBERS = 0, 1, 2  # of a belief
+BELIEF_SIZE = NUMBERS + 27
+MEASURED, CONTEXT = 1, 8  # of a report
+REPORT_SIZE = CONTEXT + CONTEXT_SIZE
+BACKWARDS = -1.0  # what `packed_step` returns where the report is before the belief: NIS cannot be negative
+
+
+@njit(**INLINE)
+def look(p: Three, v: Three, A: Six, B: Nine, C: Six, z: FloatArray, k: int, c: FloatArray, o: int) -> Conditioned:
+    """Condition on the report `z[k:k + 7]`, NaN where not measured, of the sensor with context `c[o:o + 66]`."""
+    here, speed = p, v
+    d = (p[0] - c[o + POSITION], p[1] - c[o + POSITION + 1], p[2] - c[o + POSITION + 2])
+    e = o + ROTATION
+    R = (c[e], c[e + 1], c[e + 2], c[e + 3], c[e + 4], c[e + 5], c[e + 6], c[e + 7], c[e + 8])
+    n = o + NOISE
+    total = 0.0
+    if R[0] + R[4] + R[8] == 3.0:  # not turned: no other rotation has this trace
+        r, azimuth, elevation, h_r, h_a, h_e = polar(d)
+    else:
+        r, azimuth, elevation, h_r, h_a, h_e = turned_polar(R, d)
+    if not math.isnan(z[k]):
+        p, v, A, B, C, nis, _ = condition(p, v, A, B, C, here, h_r, z[k] - r, c[n])
+        total += nis
+    if not math.isnan(z[k + 1]):
+        p, v, A, B, C, nis, _ = condition(p, v, A, B, C, here, h_a, near(z[k + 1] - azimuth), c[n + 8])
+        total += nis
+    if not math.isnan(z[k + 2]):
+        p, v, A, B, C, nis, _ = condition(p, v, A, B, C, here, h_e, near(z[k + 2] - elevation), c[n + 16])
+        total += nis
+    if not math.isnan(z[k + 3]):
+        u = (speed[0] - c[o + VELOCITY], speed[1] - c[o + VELOCITY + 1], speed[2] - c[o + VELOCITY + 2])
+        rate, h, g = range_rate(d, u)
+        p, v, A, B, C, nis, _ = condition_rate(p, v, A, B, C, here, speed, h, g, z[k + 3] - rate, c[n + 24])
+        total += nis
+    for a in range(3):
+        if not math.isnan(z[k + 4 + a]):
+            h = (c[e + a], c[e + 3 + a], c[e + 6 + a])
+            seen = h[0] * d[0] + h[1] * d[1] + h[2] * d[2]
+            p, v, A, B, C, nis, _ = condition(p, v, A, B, C, here, h, z[k + 4 + a] - seen, c[n + 32 + 8 * a])
+            total += nis
+    return p, v, A, B, C, total
+
+
+@njit(types.float64(VECTOR, VECTOR), **FAST)
+def packed_step(belief: FloatArray, report: FloatArray) -> float:
+    """Move a packed belief (29,) to the report's time at nearly constant velocity and condition it on it, in place.
+
+    Returns the normalised innovation squared; NaN where an innovation variance was not positive, and BACKWARDS, with
+    nothing changed, where the report is before the belief or its time is not a number.
+    """
+    dt = report[TIME] - belief[TIME]
+    if not dt >= 0.0:
+        return BACKWARDS
+    p, v, A, B, C = load(belief, NUMBERS, 1)
+    p, v, A, B, C = move(p, v, A, B, C, dt, belief[POWER])
+    p, v, A, B, C, nis = look(p, v, A, B, C, report, MEASURED, report, CONTEXT)
+    store(belief, NUMBERS, 1, p, v, A, B, C)
+    belief[TIME] = report[TIME]
+    return float(nis)
+
+
+@njit(
+    types.int64(VECTOR, VECTOR, MATRIX, MATRIX, types.int64[::1], MATRIX, VECTOR),
+    nogil=True,
+    **FAST,
+)
+def packed_stream(
+    belief: FloatArray,
+    t: FloatArray,
+    z: FloatArray,
+    contexts: FloatArray,
+    sensor: IntArray,
+    kept: FloatArray,
+    nis: FloatArray,
+) -> int:
+    """Filter k reports in order of time, in place: z (k, 7), `sensor` (k,) which row of `contexts` (s, 66) each is of.
+
+    Filled per report unless they are empty: `kept` (k, 27) with the belief after it, `nis` (k,). Returns the reports
+    done: less than k where time ran backwards or an innovation variance was not positive.
+    """
+    p, v, A, B, C = load(belief, NUMBERS, 1)
+    q = belief[POWER]
+    now = belief[TIME]
+    flat_z, flat_c, flat_kept = z.reshape(-1), contexts.reshape(-1), kept.reshape(-1)
+    width = contexts.shape[1]
+    done = 0
+    for k in range(t.shape[0]):
+        dt = t[k] - now
+        if not dt >= 0.0:
+            break
+        p, v, A, B, C = move(p, v, A, B, C, dt, q)
+        now = t[k]
+        p, v, A, B, C, value = look(p, v, A, B, C, flat_z, 7 * k, flat_c, sensor[k] * width)
+        if math.isnan(value):
+            break
+        if kept.shape[0] > 0:
+            store(flat_kept, 27 * k, 1, p, v, A, B, C)
+        if nis.shape[0] > 0:
+            nis[k] = value
+        done += 1
+    store(belief, NUMBERS, 1, p, v, A, B, C)
+    belief[TIME] = now
+    return done
