@@ -78,17 +78,24 @@ def filter_rows(quick: bool) -> list[dict[str, Any]]:
 
 
 def assignment_rows(quick: bool) -> list[dict[str, Any]]:
-    """Assignment at growing size: equal cost, then time."""
-    out = []
-    for targets in (100, 1000) if quick else (100, 1000, 5000):
-        p = assignment.problem(targets)
-        np.testing.assert_allclose(assignment.sparse(p), assignment.dense(p), atol=1e-6)
-        contenders: Contenders = {
-            "boresight": (lambda p=p: [assignment.sparse_only(p) for _ in range(20)], 20),
-            "SciPy dense": (lambda p=p: assignment.dense(p), 1),
-        }
-        out += rows_of(f"assignment, {targets} targets", contenders, 3 if quick else 5, "ms", 1e3)
-    return out
+    """Gate and assignment at growing size: equal cost, then time."""
+    out, ours = [], {}
+    for targets in (100, 1000, 5000):
+        f = assignment.frame(targets)
+        calls = 2000 // targets + 1
+        contenders: Contenders = {"boresight": (lambda f=f, c=calls: [assignment.ours(f) for _ in range(c)], calls)}
+        if targets < 5000 or not quick:  # the dense matrix of 5,000 takes seconds
+            np.testing.assert_allclose(assignment.dense(f), assignment.ours(f), rtol=1e-9)
+            contenders["SciPy dense"] = (lambda f=f: assignment.dense(f), 1)
+        if targets == 100:
+            prepared = assignment.stone_soup(f)
+            np.testing.assert_allclose(assignment.stone_soup_cost(prepared), assignment.ours(f), rtol=1e-9)
+            contenders["Stone Soup"] = (lambda p=prepared: assignment.stone_soup_cost(p), 1)
+        out += rows_of(f"gate and assignment, {targets} targets", contenders, 3 if quick else 5, "ms", 1e3)
+        ours[targets] = next(r["value"] for r in out if r["work"].endswith(f" {targets} targets"))
+    growth = float(np.log(ours[5000] / ours[100]) / np.log(50.0))
+    work = "gate and assignment, growth exponent 100 to 5,000"
+    return [*out, {"work": work, "contender": "boresight", "value": growth, "unit": "exponent", "ratio": 1.0}]
 
 
 def tracker_rows(quick: bool) -> list[dict[str, Any]]:
