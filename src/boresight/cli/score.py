@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from boresight.cli.output import print_json, print_table
+from boresight.errors import UserError
 from boresight.io.recording import read_recording
 from boresight.io.results import read_results
 from boresight.metrics.score import CUT_OFF, score
@@ -50,7 +52,7 @@ SENSORS = {
 }
 
 
-def score_command(out: Path, rec: Path, /, *, json: bool = False) -> None:
+def score_command(out: Path, rec: Path, /, *, smoothed: bool = False, json: bool = False) -> None:
     """Score tracks against the truth of their recording: GOSPA, OSPA, tracked fraction, identities, NEES, NIS.
 
     Parameters
@@ -59,16 +61,23 @@ def score_command(out: Path, rec: Path, /, *, json: bool = False) -> None:
         Folder of the results (boresight track -o).
     rec
         Folder of the recording, with truth.
+    smoothed
+        Score smoothed.parquet (boresight track --lag) instead of the causal tracks.
     json
         Print one JSON object instead of tables.
     """
     recording = read_recording(rec)
     results = read_results(out)
+    if smoothed:
+        if results.smoothed is None:
+            raise UserError(f"{out}: no smoothed.parquet; write it with: boresight track {rec} -o {out} --lag 5")
+        results = replace(results, tracks=results.smoothed)
     rows = score_rows(recording, results)
     if json:
         parameters = {
             "results": str(out),
             "recording": str(rec),
+            "smoothed": smoothed,
             "cut_off_m": CUT_OFF,
             "p": 2,
             "alpha": 2,

@@ -8,8 +8,9 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -24,6 +25,10 @@ from boresight.io.scans import iter_scans, selected
 from boresight.tracking.config import TrackerConfig
 from boresight.types import FATES, DecisionRows, Recording, Results, Scan
 
+if TYPE_CHECKING:
+    from boresight.tracking.output import Rows
+
+LONGEST_LAG = 600.0  # s
 BESIDE = "tracker.toml"  # a configuration that lies in the recording's folder is used unless --config names another
 
 
@@ -34,6 +39,7 @@ def track(
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     sensors: str | None = None,
     config: Path | None = None,
+    lag: Annotated[float | None, Parameter(name="--lag")] = None,
     force: bool = False,
     report: Annotated[bool, Parameter(negative="--no-report")] = True,
     json: bool = False,
@@ -50,6 +56,8 @@ def track(
         Sensors to use, separated by commas (all).
     config
         TOML with the tracker's settings (tracker.toml in the recording's folder if there is one, else defaults).
+    lag
+        Also write smoothed.parquet: the tracks of so many seconds ago, smoothed with all reports since.
     force
         Replace the output folder.
     report
@@ -63,10 +71,15 @@ def track(
     source = config if config is not None else (rec / BESIDE if (rec / BESIDE).is_file() else None)
     known = [s.id for s in recording.sensors]
     settings = TrackerConfig() if source is None else read_tracker_config(source, known)
+    if lag is not None:
+        if not 0.0 <= lag <= LONGEST_LAG:
+            raise UserError(f"--lag: {lag} s; give 0 to {LONGEST_LAG:g} s")
+        settings = replace(settings, smoothing_lag=lag)
     results = track_recording(recording, settings, ids)
     command = ["boresight", "track", str(rec), "-o", str(output)]
     command += ["--sensors", ",".join(ids)] if ids else []
     command += ["--config", str(config)] if config else []
+    command += ["--lag", f"{lag:g}"] if lag is not None else []
     results.summary["command"] = shlex.join(command)
     results.summary["recording_folder"] = str(rec)
     results.summary["config_file"] = None if source is None else str(source)
@@ -107,7 +120,8 @@ def track_recording(recording: Recording, config: TrackerConfig, sensors: list[s
     scans = list(iter_scans(recording, sensors))
     started = time.perf_counter()
     with _progress(len(scans)) as tick:
-        state, rows, decisions = run(tracker, scans, progress=tick)
+        smoothed: list[Rows] = []
+        state, rows, decisions = run(tracker, scans, progress=tick, smoothed=smoothed)
     seconds = time.perf_counter() - started
     tracks = track_rows(rows)
     fates = decision_rows(recording, tracker, decisions, state.names)
@@ -128,7 +142,7 @@ def track_recording(recording: Recording, config: TrackerConfig, sensors: list[s
         "parameters": parameters_of(config),
         "versions": versions(),
     }
-    return Results(tracks, fates, summary)
+    return Results(tracks, fates, summary, track_rows(smoothed) if config.smoothing_lag is not None else None)
 
 
 def _fates(rows: DecisionRows) -> dict[str, int]:

@@ -24,6 +24,9 @@ TRACKER_KEYS = {
     "static_share": ("static_share", 1.0),
     "static_wander_m2_s": ("static_q", 1.0),
     "stop_floor": ("stop_floor", 1.0),
+    "start_floor": ("start_floor", 1.0),
+    "targets_at_start": ("targets_at_start", 1.0),
+    "apart_m": ("apart", 1.0),
     "doubt": ("doubt", 1.0),
     "confirm_above": ("confirm_above", 1.0),
     "hide_below": ("hide_below", 1.0),
@@ -33,6 +36,7 @@ TRACKER_KEYS = {
     "clutter_memory_looks": ("clutter_memory", 1.0),
     "coast_after_s": ("coast_after", 1.0),
     "window_s": ("window", 1.0),
+    "smoothing_lag_s": ("smoothing_lag", 1.0),
 }
 SENSOR_KEYS = {
     "bias_range_m": ("bias_range", 1.0),
@@ -44,6 +48,7 @@ SENSOR_KEYS = {
     "fade_range_m": ("fade_range", 1.0),
     "resolution_m": ("resolution", 1.0),
     "report_range_m": ("report_range", 1.0),
+    "moves_tracks": ("moves_tracks", 1.0),
 }
 
 
@@ -60,6 +65,9 @@ class TrackerTable(TableModel, frozen=True):
     static_share: float | None = None
     static_wander_m2_s: float | None = None
     stop_floor: float | None = None
+    start_floor: float | None = None
+    targets_at_start: float | None = None
+    apart_m: float | None = None
     doubt: float | None = None
     confirm_above: float | None = None
     hide_below: float | None = None
@@ -69,6 +77,7 @@ class TrackerTable(TableModel, frozen=True):
     clutter_memory_looks: float | None = None
     coast_after_s: float | None = None
     window_s: float | None = None
+    smoothing_lag_s: float | None = None
 
 
 class ErrorsTable(TableModel, frozen=True):
@@ -84,6 +93,7 @@ class ErrorsTable(TableModel, frozen=True):
     fade_range_m: float | None = None
     resolution_m: float | None = None
     report_range_m: float | None = None
+    moves_tracks: bool | None = None
 
 
 class ConfigTable(TableModel, frozen=True):

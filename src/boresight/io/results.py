@@ -17,6 +17,7 @@ from boresight.io.paths import ENU, VELOCITY
 from boresight.io.table import NUMBER, TEXT, WHOLE, Table, nullable, read_table, write_table
 from boresight.types import FATES, NO_TRACK, STATUSES, DecisionRows, FloatArray, Recording, Results, TrackRows
 
+SMOOTHED = "smoothed.parquet"
 COVARIANCE = {
     "cov_ee": (0, 0),
     "cov_en": (0, 1),
@@ -36,11 +37,13 @@ DECISION_SCHEMA: dict[str, str] = {"row": WHOLE, "fate": TEXT, "track_id": WHOLE
 
 
 def write_results(results: Results, recording: Recording, folder: Path) -> None:
-    """Write the three files into a folder that is there (see `files.output_folder`).
+    """Write the three files (four with smoothed rows) into a folder that is there (see `files.output_folder`).
 
     summary.json gets the key `recording` (name, dimensions, site), so that results can be exported by themselves.
     """
     write_table(folder / "tracks.parquet", _track_columns(results.tracks))
+    if results.smoothed is not None:
+        write_table(folder / SMOOTHED, _track_columns(results.smoothed))
     write_table(folder / "decisions.parquet", _decision_columns(results.decisions))
     site = recording.site
     about = {
@@ -62,10 +65,12 @@ def read_results(path: Path | str) -> Results:
     if not folder.is_dir():
         what = "is a file, not a results folder" if folder.exists() else "no such results folder"
         raise UserError(f"{folder}: {what}")
+    past = folder / SMOOTHED
     return Results(
-        _tracks(read_table(folder / "tracks.parquet", TRACK_SCHEMA, tuple(TRACK_SCHEMA))),
+        _tracks(read_table(folder / "tracks.parquet", TRACK_SCHEMA, tuple(TRACK_SCHEMA)), causal=True),
         _decisions(read_table(folder / "decisions.parquet", DECISION_SCHEMA, tuple(DECISION_SCHEMA), others=True)),
         read_summary(folder / "summary.json"),
+        _tracks(read_table(past, TRACK_SCHEMA, tuple(TRACK_SCHEMA)), causal=False) if past.is_file() else None,
     )
 
 
@@ -80,9 +85,10 @@ def read_summary(path: Path) -> dict[str, Any]:
     return data
 
 
-def _tracks(table: Table) -> TrackRows:
+def _tracks(table: Table, causal: bool) -> TrackRows:
     t, known = table.numbers("t_s", required=True), table.numbers("t_known_s", required=True)
-    table.fail_where(known > t, "t_known_s = {} is later than t_s", known)
+    if causal:
+        table.fail_where(known > t, "t_known_s = {} is later than t_s", known)
     covariance = np.full((len(table), 3, 3), np.nan)
     for name, (i, j) in COVARIANCE.items():
         covariance[:, i, j] = covariance[:, j, i] = table.numbers(name, required=2 not in (i, j))

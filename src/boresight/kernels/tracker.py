@@ -40,6 +40,7 @@ class Tracks(NamedTuple):
     life: FloatArray  # (cap, 4) time of birth, time of last hit, shown (0 or 1), hits
     last_look: FloatArray  # (n_sensors,) s
     clutter: FloatArray  # (n_sensors, AZIMUTH_BINS + 1) mean false detections of a look, per azimuth bin and in all
+    undetected: FloatArray  # (1,) expected number of targets that no track follows yet
     seen_range: FloatArray  # (n_sensors,) m, longest range so far (stands in for a coverage without end)
 
 
@@ -74,6 +75,7 @@ class SensorTable(NamedTuple):
     fade_range: float  # m: where p_detection has fallen to half
     resolution: float  # m: nearer targets may give one detection together
     report_range: float  # m: targets farther from the sensor are tracked but not shown on its word
+    moves_tracks: bool  # False: its detections are evidence that a track exists, but do not move it
 
 
 class Settings(NamedTuple):
@@ -90,6 +92,8 @@ class Settings(NamedTuple):
     static_share: float  # of a new track's existence
     static_q: float  # m²/s
     stop_floor: float  # least weight of "it does not move": a target may stop
+    start_floor: float  # least weight of "it moves", beside that of "it does not": what lay still may set off
+    targets_at_start: float  # expected number of targets before the first look
     doubt: float  # least existence with which a track competes for detections
     delete_below: float
     show_above: float
@@ -98,6 +102,7 @@ class Settings(NamedTuple):
     bias_tau: FloatArray  # (n - 2d,)
     farthest_report: float  # m, the largest report range of the sensors in use
     merge_distance: float
+    apart: float  # m: a track nearer than this to a shown one is not shown beside it
     lonely_bearings: bool  # bearings update only where nobody else could claim them
     clutter_memory: float  # looks
 

@@ -149,7 +149,7 @@ def scan_step(
         begin(tr, s, sensor, look, fate, owner, row_of_col, usable)
     if sensor.ranging:
         show(tr, s, sensor, look)
-    end_and_merge(tr, s)
+    end_and_merge(tr, s, sensor.ranging)
     tr.live[1] += 1
 
 
@@ -339,9 +339,12 @@ def weigh(tr: Tracks, i: int, log_visible: float, log_static: float, temper: flo
 
 @njit(cache=True)
 def allow_stop(tr: Tracks, i: int, s: Settings) -> None:
-    """Let a target that moved begin to stand still where it is now: the anchor is dropped anew."""
+    """Let a target that moved begin to stand still where it is now, the anchor dropped anew; and the reverse."""
     w = tr.weight[i]
     target = w[VISIBLE] + w[HIDDEN]
+    if target < s.start_floor * w[STATIC]:
+        w[VISIBLE] += s.start_floor * w[STATIC]
+        w[STATIC] -= s.start_floor * w[STATIC]
     if w[STATIC] < s.stop_floor * target:
         w[VISIBLE] -= s.stop_floor * w[VISIBLE]
         w[HIDDEN] -= s.stop_floor * w[HIDDEN]
@@ -376,7 +379,8 @@ def take(
     if sensor.ranging and world_fix(look, k, s, sensor, fix, fix_R, J, used):
         moving = moving_likelihood(tr, i, s, sensor, fix, fix_R, J, used)
         log_static += static_likelihood(tr, i, s, fix, fix_R, True) - moving
-    apply_update(tr.x[i], tr.P[i], y, S, PHt, c)
+    if sensor.moves_tracks:
+        apply_update(tr.x[i], tr.P[i], y, S, PHt, c)
     weigh(tr, i, log_visible, log_static, temper)
     if sensor.ranging:
         allow_stop(tr, i, s)
@@ -526,6 +530,13 @@ def begin(
     fix = np.empty(3)
     mask = np.empty(3, np.int64)
     R = np.zeros((3, 3))
+    if tr.live[1] == 0:  # a first look full of targets must not pass for clutter: take them at their number
+        spare = 0.0
+        for k in range(len(look.dt)):
+            spare += 1.0 if usable[k] else 0.0
+        tr.undetected[0] = max(tr.undetected[0], spare - tr.clutter[sensor.number, AZIMUTH_BINS])
+    expected = tr.undetected[0] * sensor.p_detection
+    tr.undetected[0] += s.birth_rate - expected
     for k in range(len(look.dt)):
         if not usable[k] or row_of_col[k] >= 0 or position_fix(look, k, s, sensor, fix, J, mask) == 0:
             continue
@@ -564,8 +575,7 @@ def begin(
                 P[a, b] = acc + shared + ((dt * s.speed_sigma) ** 2 if a == b else 0.0)
                 tr.anchor_P[i, a, b] = acc
         density = tr.clutter[sensor.number, AZIMUTH_BINS]
-        # a first look full of targets must not pass for clutter: their number is not known yet
-        born = max(s.birth_rate / (s.birth_rate + density), 5.0 * s.delete_below)
+        born = max(expected / (expected + density), 5.0 * s.delete_below)
         w = tr.weight[i]
         w[VISIBLE] = born * (1.0 - s.static_share)
         w[HIDDEN] = 0.0
@@ -611,12 +621,25 @@ def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look) -> None:
         if tr.life[i, 2] > 0.0:
             if sensor.report_range == s.farthest_report and gap > (1.1 * sensor.report_range) ** 2:
                 tr.life[i, 2] = 0.0
-        elif target > s.show_above and gap < sensor.report_range**2:
+        elif target > s.show_above and gap < sensor.report_range**2 and stands_apart(tr, i, s):
             tr.life[i, 2] = 1.0
 
 
 @njit(cache=True)
-def end_and_merge(tr: Tracks, s: Settings) -> None:
+def stands_apart(tr: Tracks, i: int, s: Settings) -> bool:
+    """Whether no shown track is so near that `i` may be another part of the same object."""
+    for j in range(tr.live[0]):
+        if tr.life[j, 2] > 0.0 and j != i:
+            gap = 0.0
+            for a in range(s.d):
+                gap += (tr.x[i, a] - tr.x[j, a]) ** 2
+            if gap < s.apart**2:
+                return False
+    return True
+
+
+@njit(cache=True)
+def end_and_merge(tr: Tracks, s: Settings, merging: bool) -> None:
     """Drop tracks that are probably nothing, and the weaker of two that have become one."""
     n_tracks = tr.live[0]
     keep = np.ones(n_tracks, np.bool_)
@@ -628,7 +651,7 @@ def end_and_merge(tr: Tracks, s: Settings) -> None:
         elif target < s.hide_below:
             tr.life[i, 2] = 0.0
     order = np.argsort(tr.x[:n_tracks, 0])  # neighbours lie next to each other in the east
-    for a in range(n_tracks):
+    for a in range(n_tracks if merging else 0):
         i = order[a]
         for b in range(a + 1, n_tracks):
             j = order[b]

@@ -23,6 +23,7 @@ class SensorErrors:
     decorrelation: float = 0.0  # s: looks closer in time are not independent evidence that a target exists
     fade_range: float = float("inf")  # m: where the detection probability has fallen to half
     resolution: float = 0.0  # m: targets nearer to each other may give one detection together (ranging sensors)
+    moves_tracks: bool = True  # False: its detections are evidence that a track exists, but do not move it
     report_range: float = float("inf")  # m: farther targets are tracked but not shown (ranging sensors)
 
 
@@ -44,6 +45,9 @@ class TrackerConfig:
     static_share: float = 0.3  # of new objects do not move (and are not reported)
     static_q: float = 0.5  # m²/s, how an object that does not move may still wander
     stop_floor: float = 0.02  # least weight of "it stands still", beside that of a moving target
+    start_floor: float = 0.0  # least weight of "it moves", beside that of "it stands still"
+    targets_at_start: float = 5.0  # expected number of targets before the first look
+    apart: float = 0.0  # m: a track nearer than this to a shown one is not shown beside it
     doubt: float = 0.1  # least probability of existence with which a track competes for detections
     confirm_above: float = 0.9  # probability of a moving target above which a track is shown
     hide_below: float = 0.4  # and below which it is shown no more
@@ -52,6 +56,7 @@ class TrackerConfig:
     lonely_bearings: bool = True
     clutter_memory: float = 30.0  # looks
     coast_after: float = 4.0  # s without a hit after which a shown track counts as coasting
+    smoothing_lag: float | None = None  # s: also give the tracks of so long ago, smoothed with all that came since
     window: float | None = (
         None  # s, how late a report may be (None: spread of the declared latencies + half the longest period + 1 s)
     )

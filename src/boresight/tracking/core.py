@@ -74,6 +74,7 @@ def make_plan(
                 fade_range=errors.fade_range,
                 resolution=errors.resolution,
                 report_range=errors.report_range,
+                moves_tracks=errors.moves_tracks,
             )
         )
     gates = np.array([0.0, *chi2.ppf(config.gate_probability, np.arange(1, 8))])
@@ -89,6 +90,8 @@ def make_plan(
         static_share=config.static_share,
         static_q=config.static_q,
         stop_floor=config.stop_floor,
+        start_floor=config.start_floor,
+        targets_at_start=config.targets_at_start,
         doubt=config.doubt,
         delete_below=config.delete_below,
         show_above=config.confirm_above,
@@ -99,6 +102,7 @@ def make_plan(
             [t.report_range for t in tables if t.ranging and (used is None or t.number in used)] or [0.0]
         ),
         merge_distance=config.merge_distance if config.merge_distance is not None else (10.0 if flat else 30.0),
+        apart=config.apart,
         lonely_bearings=config.lonely_bearings,
         clutter_memory=config.clutter_memory,
     )
@@ -124,6 +128,7 @@ def empty_tracks(plan: Plan, capacity: int = 64) -> Tracks:
         life=np.zeros((capacity, 4)),
         last_look=np.full(len(plan.sensors), -np.inf),
         clutter=clutter,
+        undetected=np.full(1, plan.settings.targets_at_start),
         seen_range=np.zeros(len(plan.sensors)),
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -86,6 +87,12 @@ class Rows:
     position: FloatArray  # (n, d)
     velocity: FloatArray  # (n, d)
     covariance: FloatArray  # (n, d, d)
+
+    def select(self, keep: NDArray[np.bool_], names: Mapping[int, int]) -> Rows:
+        """Return the rows of `keep` (n,), with the track ids that `names` gives their births."""
+        parts = {name: getattr(self, name)[keep] for name in self.__dataclass_fields__}
+        parts["track_id"] = np.array([names[int(b)] for b in parts["birth"]], dtype=np.int64)
+        return Rows(**parts)
 
 
 def rows_at(tr: Tracks, plan: Plan, t: float, t_known: float, coast_after: float) -> Rows | None:

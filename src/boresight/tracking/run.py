@@ -44,8 +44,12 @@ def run(
     *,
     finish: bool = True,
     progress: Callable[[Scan], None] | None = None,
+    smoothed: list[Rows] | None = None,
 ) -> tuple[TrackerState, list[Rows], list[Decision]]:
-    """Step a tracker through scans in order of arrival, from `state` (a fresh one); consumes it."""
+    """Step a tracker through scans in order of arrival, from `state` (a fresh one); consumes it.
+
+    Smoothed rows, where the tracker's settings ask for them, are added to the list `smoothed`.
+    """
     state = tracker.init() if state is None else state
     rows: list[Rows] = []
     decisions: list[Decision] = []
@@ -53,12 +57,16 @@ def run(
         state, out = tracker.step(state, scan)
         rows += out.rows
         decisions += out.decisions
+        if smoothed is not None:
+            smoothed += out.smoothed
         if progress is not None:
             progress(scan)
     if finish:
         state, out = tracker.finish(state)
         rows += out.rows
         decisions += out.decisions
+        if smoothed is not None:
+            smoothed += out.smoothed
     return state, rows, decisions
 
 

@@ -15,7 +15,7 @@ from boresight.tracking.tracker import Tracker, TrackerState
 from boresight.tracking.window import Entry, Window
 
 Arrays = dict[str, NDArray[np.generic]]
-FORMAT = 1
+FORMAT = 2
 
 
 def snapshot(state: TrackerState) -> TrackerState:
@@ -34,6 +34,7 @@ def snapshot(state: TrackerState) -> TrackerState:
         state.numbered,
         dict(state.names),
         dict(state.last_row),
+        state.smoothed,
     )
 
 
@@ -45,7 +46,7 @@ def arrays_of_state(state: TrackerState) -> Arrays:
         "scalars": np.array(
             [window.arrivals, len(window.entries), len(window.copies), state.pending, state.numbered], np.int64
         ),
-        "clock": np.array([clock.arrival, clock.emitted]),
+        "clock": np.array([clock.arrival, clock.emitted, state.smoothed]),
         "last": np.array(list(clock.last.items()), np.float64).reshape(-1, 2),
         "names": np.array(list(state.names.items()), np.int64).reshape(-1, 2),
         "last_row": np.array(list(state.last_row.values()), np.float64),
@@ -74,7 +75,7 @@ def state_of_arrays(arrays: Mapping[str, NDArray[np.generic]], tracker: Tracker)
     if arrays["tracks.x"].shape[1] != tracker.plan.n_states or len(arrays["tracks.last_look"]) != len(tracker.sensors):
         raise UserError("saved tracker state: made with other sensors or settings; use the same recording and --config")
     arrivals, n_entries, n_copies, pending, numbered = (int(v) for v in np.asarray(arrays["scalars"], np.int64))
-    arrival, emitted = (float(v) for v in np.asarray(arrays["clock"], np.float64))
+    arrival, emitted, smoothed = (float(v) for v in np.asarray(arrays["clock"], np.float64))
     clock = Clock(arrival, emitted)
     clock.last = {int(s): float(t) for s, t in np.asarray(arrays["last"], np.float64)}
     for name, gaps in arrays.items():
@@ -91,7 +92,7 @@ def state_of_arrays(arrays: Mapping[str, NDArray[np.generic]], tracker: Tracker)
     names = {int(birth): int(name) for birth, name in np.asarray(arrays["names"], np.int64)}
     last_row = dict(zip(names, np.asarray(arrays["last_row"], np.float64).tolist(), strict=True))
     window = Window(_take_tracks(arrays, "tracks"), arrivals, entries, copies)
-    return TrackerState(window, clock, bool(pending), numbered, names, last_row)
+    return TrackerState(window, clock, bool(pending), numbered, names, last_row, smoothed)
 
 
 def _put_tracks(out: Arrays, prefix: str, tracks: Tracks) -> None:

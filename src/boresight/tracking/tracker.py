@@ -13,8 +13,9 @@ from boresight.frames.pose import PoseTrack, add_navigation_noise, sensor_pose
 from boresight.kernels.tracker import GATED, INITIATED, OUTSIDE, UNASSOCIATED, UPDATED, Look
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.core import Plan, make_plan
+from boresight.tracking.lagged import smoothed_rows
 from boresight.tracking.output import Clock, Rows, due_at_arrival, due_before, note_arrival, period_of, rows_at
-from boresight.tracking.window import Entry, Window, empty_window, insert
+from boresight.tracking.window import Entry, Window, empty_window, expire, insert
 from boresight.types import Fate, FloatArray, Scan, Sensor
 
 MAX_ROW_GAP = 0.5  # s between two rows of one track id
@@ -54,13 +55,15 @@ class TrackerState:
     numbered: int = 0  # track ids given out
     names: dict[int, int] = field(default_factory=dict)  # birth row -> track id, the newest
     last_row: dict[int, float] = field(default_factory=dict)  # birth row -> time of its newest row (s)
+    smoothed: float = -np.inf  # s, time of the newest smoothed rows
 
 
 class Output(NamedTuple):
-    """What one step gives: rows of tracks (in order) and decisions that are final."""
+    """What one step gives: rows of tracks (in order), decisions that are final, and smoothed rows of the past."""
 
     rows: list[Rows]
     decisions: list[Decision]
+    smoothed: list[Rows]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +113,7 @@ class Tracker:
         Rows that the looks up to the previous arrival call for come out first: looks that arrive together are all
         taken before rows are made.
         """
-        out = Output([], [])
+        out = Output([], [], [])
         if state.pending and scan.t_recv > state.clock.arrival:
             self._rows(state, out)
             for t in due_before(state.clock, scan.t_recv):
@@ -122,20 +125,32 @@ class Tracker:
         if look is None:
             out.decisions.extend(Decision(int(row), Fate.SCREENED, -1, np.nan) for row in scan.row)
             return state, out
-        final = insert(state.window, self.plan, scan.sensor, look, self.length)
-        if final is None:
+        if not insert(state.window, self.plan, scan.sensor, look, self.length):
             out.decisions.extend(Decision(int(row), Fate.LATE, -1, np.nan) for row in scan.row)
-        else:
-            out.decisions.extend(decision for entry in final for decision in _decisions(entry))
+        lag = self.config.smoothing_lag
+        if lag is not None:
+            self._smooth(state, out, state.clock.arrival - lag)
+        final = expire(state.window, self.length if lag is None else max(self.length, lag))
+        out.decisions.extend(decision for entry in final for decision in _decisions(entry))
         return state, out
 
     def finish(self, state: TrackerState) -> tuple[TrackerState, Output]:
-        """Give the rows that the last arrival calls for and the decisions still in the window."""
-        out = Output([], [])
+        """Give the rows that the last arrival calls for, the decisions and the smoothed rows still in the window."""
+        out = Output([], [], [])
         if state.pending:
             self._rows(state, out)
+        if self.config.smoothing_lag is not None:
+            self._smooth(state, out, np.inf)
         out.decisions.extend(decision for entry in state.window.entries for decision in _decisions(entry))
         return state, out
+
+    def _smooth(self, state: TrackerState, out: Output, until: float) -> None:
+        known = state.clock.arrival
+        for rows in smoothed_rows(state.window, self.plan, state.smoothed, until, known, self.config.coast_after):
+            state.smoothed = float(rows.t[0])
+            named = np.array([birth in state.names for birth in rows.birth.tolist()])
+            if named.any():
+                out.smoothed.append(rows.select(named, state.names))
 
     def _rows(self, state: TrackerState, out: Output) -> None:
         periods = {i: period_of(state.clock, i, self.sensors[i].period) for i in self.used}

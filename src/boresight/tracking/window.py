@@ -47,15 +47,12 @@ def empty_window(plan: Plan) -> Window:
     return Window(empty_tracks(plan))
 
 
-def insert(window: Window, plan: Plan, sensor: int, look: Look, length: float) -> list[Entry] | None:
-    """Take one look into the window of `length` seconds; returns the entries that left it (now final).
-
-    Returns None, and changes nothing, where the look is older than the window.
-    """
+def insert(window: Window, plan: Plan, sensor: int, look: Look, length: float) -> bool:
+    """Take one look into the window of `length` seconds; False, and nothing is changed, where it is older than that."""
     entry = Entry((look.t, window.arrivals), sensor, look)
     newest = window.entries[-1].key if window.entries else (-np.inf, -1)
     if look.t < newest[0] - length:
-        return None
+        return False
     window.arrivals += 1
     if entry.key > newest:
         window.entries.append(entry)
@@ -71,7 +68,7 @@ def insert(window: Window, plan: Plan, sensor: int, look: Look, length: float) -
         else:  # older than everything so far, and nothing has left the window yet
             key, window.tracks = entry.key, empty_tracks(plan)
         _process(window, plan, bisect.bisect_left(window.entries, key, key=lambda e: e.key), length)
-    return _expire(window, length)
+    return True
 
 
 def _process(window: Window, plan: Plan, first: int, length: float) -> None:
@@ -81,8 +78,10 @@ def _process(window: Window, plan: Plan, first: int, length: float) -> None:
         window.tracks, entry.fate, entry.owner, entry.nis = step(window.tracks, plan, entry.sensor, entry.look)
 
 
-def _expire(window: Window, length: float) -> list[Entry]:
-    """Drop what can no longer be needed: a late look is at least as new as the newest minus the window."""
+def expire(window: Window, length: float) -> list[Entry]:
+    """Drop what `length` seconds of window no longer need; returns the entries that left it, now final."""
+    if not window.entries:
+        return []
     oldest = window.entries[-1].key[0] - length
     keep = 0
     while keep + 1 < len(window.copies) and window.copies[keep + 1][0][0] <= oldest:

@@ -54,6 +54,7 @@ class Results:
     tracks: TrackRows
     decisions: DecisionRows
     summary: dict[str, Any]
+    smoothed: TrackRows | None = None  # of the past, each row with what came up to its t_known (later than its t)
 
 
 def no_tracks() -> TrackRows:
