@@ -44,6 +44,11 @@ SENSOR_KEYS = {
     "bias_elevation_deg": ("bias_elevation", DEG),
     "bias_position_m": ("bias_position", 1.0),
     "bias_time_s": ("bias_time", 1.0),
+    "offset_time_s": ("offset_time", 1.0),
+    "offset_range_m": ("offset_range", 1.0),
+    "offset_range_scale": ("offset_scale", 1.0),
+    "offset_azimuth_deg": ("offset_azimuth", DEG),
+    "offset_elevation_deg": ("offset_elevation", DEG),
     "decorrelation_s": ("decorrelation", 1.0),
     "fade_range_m": ("fade_range", 1.0),
     "resolution_m": ("resolution", 1.0),
@@ -89,6 +94,11 @@ class ErrorsTable(TableModel, frozen=True):
     bias_elevation_deg: float | None = None
     bias_position_m: float | None = None
     bias_time_s: float | None = None
+    offset_time_s: float | None = None
+    offset_range_m: float | None = None
+    offset_range_scale: float | None = None
+    offset_azimuth_deg: float | None = None
+    offset_elevation_deg: float | None = None
     decorrelation_s: float | None = None
     fade_range_m: float | None = None
     resolution_m: float | None = None

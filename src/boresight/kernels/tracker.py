@@ -16,6 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from boresight.kernels.measurement import measure, wrap
+from boresight.kernels.registration import N_PARAMETERS, sensitivity
 from boresight.types.sensor import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -40,6 +41,8 @@ class Tracks(NamedTuple):
     life: FloatArray  # (cap, 4) time of birth, time of last hit, shown (0 or 1), hits
     last_look: FloatArray  # (n_sensors,) s
     clutter: FloatArray  # (n_sensors, AZIMUTH_BINS + 1) mean false detections of a look, per azimuth bin and in all
+    told: FloatArray  # (cap, k, k + 1) what a track was told of the k constant sensor errors: information, vector
+    bank: FloatArray  # (k, k + 1) what ended tracks had learned of them
     undetected: FloatArray  # (1,) expected number of targets that no track follows yet
     seen_range: FloatArray  # (n_sensors,) m, longest range so far (stands in for a coverage without end)
 
@@ -71,6 +74,7 @@ class SensorTable(NamedTuple):
     elevation_high: float
     ranging: bool  # can begin tracks
     bias: IntArray  # (7,) state index of the bias of each component, -1 for none
+    constant: IntArray  # (5,) state index of time offset, range, scale, azimuth and elevation error, -1 for none
     decorrelation: float  # s: looks closer in time than this are not independent evidence of existence
     fade_range: float  # m: where p_detection has fallen to half
     resolution: float  # m: nearer targets may give one detection together
@@ -99,7 +103,8 @@ class Settings(NamedTuple):
     show_above: float
     hide_below: float
     bias_sigma: FloatArray  # (n - 2d,)
-    bias_tau: FloatArray  # (n - 2d,)
+    bias_tau: FloatArray  # (n - 2d,), infinite for the constant errors, which come last
+    n_constant: int  # states that are constant errors of sensors
     farthest_report: float  # m, the largest report range of the sensors in use
     merge_distance: float
     apart: float  # m: a track nearer than this to a shown one is not shown beside it
@@ -228,7 +233,34 @@ def linearise(
         b = sensor.bias[c]
         if b >= 0:
             H[c, b] = 1.0
-            z[c] += x[b]
+    if sensor.constant.max() >= 0:
+        S = np.empty((7, N_PARAMETERS))
+        sensitivity(z, h6, velocity - look.sensor_velocity[k], S)
+        for p in range(N_PARAMETERS):
+            if sensor.constant[p] >= 0:
+                for c in range(7):
+                    H[c, sensor.constant[p]] = S[c, p]
+    for c in range(7):
+        for j in range(2 * d, n):
+            z[c] += H[c, j] * x[j]
+
+
+@njit(cache=True)
+def fix_sensitivity(
+    look: Look, k: int, sensor: SensorTable, fix: FloatArray, J: FloatArray, mask: IntArray, velocity: FloatArray
+) -> FloatArray:
+    """Return (3, 5): how the world position of detection `k` changes with the sensor's constant errors."""
+    z = np.empty(7)
+    h6 = np.empty((7, 6))
+    S = np.empty((7, N_PARAMETERS))
+    measure(fix, velocity, look.sensor_position[k], look.sensor_velocity[k], look.enu_from_sensor[k], z, h6)
+    sensitivity(z, h6, velocity - look.sensor_velocity[k], S)
+    out = np.zeros((3, N_PARAMETERS))
+    for a in range(3):
+        for p in range(N_PARAMETERS):
+            for e in range(3):
+                out[a, p] += J[a, e] * S[mask[e], p]
+    return out
 
 
 @njit(cache=True)
@@ -254,12 +286,21 @@ def innovation(
     y: FloatArray,
     S: FloatArray,
     PHt: FloatArray,
+    d: int,
+    lag: int,
 ) -> tuple[float, float]:
-    """Fill `y`, the Cholesky factor of S in `S` and P H' in `PHt`; return (NIS, log determinant of S)."""
+    """Fill `y`, the Cholesky factor of S in `S` and P H' in `PHt`; return (NIS, log determinant of S).
+
+    `lag` is the state index of the sensor's time offset (-1: none): it multiplies the velocity, and where both are
+    uncertain their product adds to mean and covariance (the second-order terms, exact for a product of Gaussians).
+    """
     n = P.shape[0]
     for i in range(m):
         c = mask[i]
         y[i] = z[c] - zhat[c]
+        if lag >= 0:
+            for a in range(d):
+                y[i] += H[c, a] * P[d + a, lag]
         if c == 1 or c == 2:
             y[i] = wrap(y[i])
         for a in range(n):
@@ -272,6 +313,11 @@ def innovation(
             acc = R[mask[i], mask[j]]
             for a in range(n):
                 acc += H[mask[i], a] * PHt[a, j]
+            if lag >= 0:
+                for a in range(d):
+                    for b in range(d):
+                        product = P[d + a, d + b] * P[lag, lag] + P[d + a, lag] * P[d + b, lag]
+                        acc += H[mask[i], a] * product * H[mask[j], b]
             S[i, j] = acc
     # in-place Cholesky and forward substitution
     nis = 0.0

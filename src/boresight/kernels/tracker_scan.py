@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from boresight.kernels.assignment import assign_sparse
 from boresight.kernels.measurement import measure
+from boresight.kernels.registration import TIME, learned, pool
 from boresight.kernels.tracker import (
     AZIMUTH_BINS,
     GATED,
@@ -29,6 +30,7 @@ from boresight.kernels.tracker import (
     apply_update,
     components,
     coverage_of,
+    fix_sensitivity,
     innovation,
     linearise,
     position_fix,
@@ -218,7 +220,9 @@ def gate_all(
             c = components(look.z[k], s.d, mask)
             if c == 0:
                 continue
-            nis, logdet = innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, c, y, S, PHt)
+            nis, logdet = innovation(
+                tr.P[i], zhat, H, look.z[k], look.R[k], mask, c, y, S, PHt, s.d, sensor.constant[TIME]
+            )
             if nis < near[k]:
                 near[k] = nis
                 if nis > s.gates[c]:
@@ -267,9 +271,28 @@ def fix_all(
             b = sensor.bias[mask[e]]
             if b >= 0:
                 total += (J[0, e] ** 2 + J[1, e] ** 2 + J[2, e] ** 2) * s.bias_sigma[b - 2 * s.d] ** 2
+        total += constant_spread(look, k, s, sensor, fixes[k], J, mask)
         spread = max(spread, total)
         dt_high = max(dt_high, abs(look.dt[k]))
     return spread, dt_high
+
+
+@njit(cache=True)
+def constant_spread(
+    look: Look, k: int, s: Settings, sensor: SensorTable, fix: FloatArray, J: FloatArray, mask: IntArray
+) -> float:
+    """Variance (m²) that the declared constant errors of the sensor may add to a detection's world position."""
+    total = 0.0
+    if sensor.constant.max() < 0:
+        return total
+    # the target's own motion is not known yet: a fast one across both axes stands for it
+    fast = np.full(3, 3.0 * s.speed_sigma)
+    G = fix_sensitivity(look, k, sensor, fix, J, mask, fast)
+    for p in range(len(sensor.constant)):
+        j = sensor.constant[p]
+        if j >= 0:
+            total += (G[0, p] ** 2 + G[1, p] ** 2 + G[2, p] ** 2) * s.bias_sigma[j - 2 * s.d] ** 2
+    return total
 
 
 @njit(cache=True)
@@ -370,14 +393,14 @@ def take(
     mask = np.empty(7, np.int64)
     linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, zhat, H, h6)
     c = components(look.z[k], s.d, mask)
-    innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, c, y, S, PHt)
+    innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, c, y, S, PHt, s.d, sensor.constant[TIME])
     log_static = log_visible
     fix = np.empty(3)
     fix_R = np.empty((3, 3))
     J = np.zeros((3, 3))
     used = np.empty(3, np.int64)
     if sensor.ranging and world_fix(look, k, s, sensor, fix, fix_R, J, used):
-        moving = moving_likelihood(tr, i, s, sensor, fix, fix_R, J, used)
+        moving = moving_likelihood(tr, i, s, sensor, look, k, fix, fix_R, J, used)
         log_static += static_likelihood(tr, i, s, fix, fix_R, True) - moving
     if sensor.moves_tracks:
         apply_update(tr.x[i], tr.P[i], y, S, PHt, c)
@@ -394,12 +417,17 @@ def moving_likelihood(
     i: int,
     s: Settings,
     sensor: SensorTable,
+    look: Look,
+    k: int,
     fix: FloatArray,
     fix_R: FloatArray,
     J: FloatArray,
     mask: IntArray,
 ) -> float:
-    """Log-likelihood of a world position under the moving track, biases included: the anchor's rival."""
+    """Log-likelihood of a world position under the moving track, biases included: the anchor's rival.
+
+    What the track knows of the sensor's constant errors is taken off `fix`, for the anchor's sake too.
+    """
     d = s.d
     n = tr.x.shape[1]
     G = np.zeros((d, n))
@@ -408,13 +436,23 @@ def moving_likelihood(
         for e in range(3):
             if sensor.bias[mask[e]] >= 0:
                 G[a, sensor.bias[mask[e]]] += J[a, e]
+    if sensor.constant.max() >= 0:
+        velocity = np.zeros(3)
+        velocity[:d] = tr.x[i, d : 2 * d]
+        C = fix_sensitivity(look, k, sensor, fix, J, mask, velocity)
+        for p in range(len(sensor.constant)):
+            j = sensor.constant[p]
+            if j >= 0:
+                G[:, j] = C[:d, p]
+                for a in range(d):
+                    fix[a] -= C[a, p] * tr.x[i, j]
     GP = G @ tr.P[i]
     L = np.zeros((3, 3))
     y = np.zeros(3)
     value = d * LOG_2PI
     for a in range(d):
         y[a] = fix[a]
-        for j in range(n):
+        for j in range(n - s.n_constant):  # the constant errors are off already
             y[a] -= G[a, j] * tr.x[i, j]
         for b in range(a + 1):
             acc = fix_R[a, b]
@@ -535,6 +573,7 @@ def begin(
         for k in range(len(look.dt)):
             spare += 1.0 if usable[k] else 0.0
         tr.undetected[0] = max(tr.undetected[0], spare - tr.clutter[sensor.number, AZIMUTH_BINS])
+    pooled = pooled_constants(tr, s)
     expected = tr.undetected[0] * sensor.p_detection
     tr.undetected[0] += s.birth_rate - expected
     for k in range(len(look.dt)):
@@ -548,8 +587,9 @@ def begin(
         P[:, :] = 0.0
         tr.anchor[i] = 0.0
         tr.anchor_P[i] = 0.0
-        for j in range(n - 2 * d):
+        for j in range(n - 2 * d - s.n_constant):
             P[2 * d + j, 2 * d + j] = s.bias_sigma[j] ** 2
+        tell(tr, i, s, pooled)
         for e in range(3):  # position covariance from noise and bias, and what it shares with the bias
             b = sensor.bias[mask[e]]
             for a in range(d):
@@ -574,6 +614,8 @@ def begin(
                         shared += J[a, e] * P[bias, bias] * J[b, e]
                 P[a, b] = acc + shared + ((dt * s.speed_sigma) ** 2 if a == b else 0.0)
                 tr.anchor_P[i, a, b] = acc
+        if sensor.constant.max() >= 0:
+            apply_constants(tr, i, s, look, k, sensor, fix, J, mask)
         density = tr.clutter[sensor.number, AZIMUTH_BINS]
         born = max(expected / (expected + density), 5.0 * s.delete_below)
         w = tr.weight[i]
@@ -593,6 +635,95 @@ def begin(
 
 
 @njit(cache=True)
+def pooled_constants(tr: Tracks, s: Settings) -> FloatArray:
+    """Information (k, k + 1) on the constant sensor errors from all shown tracks and those that have ended."""
+    k = s.n_constant
+    pooled = np.zeros((k, k + 1))
+    if k > 0:
+        live = tr.live[0]
+        sigma = s.bias_sigma[len(s.bias_sigma) - k :]
+        pool(tr.x[:live], tr.P[:live], tr.life[:live, 2], tr.told, tr.bank, sigma, pooled)
+    return pooled
+
+
+@njit(cache=True)
+def tell(tr: Tracks, i: int, s: Settings, pooled: FloatArray) -> None:
+    """Give a new track what is known of the constant errors, and note what it was told."""
+    k = s.n_constant
+    if k == 0:
+        return
+    first = tr.x.shape[1] - k
+    tr.told[i] = pooled
+    covariance = np.linalg.inv(np.ascontiguousarray(pooled[:, :k]))
+    for a in range(k):
+        tr.x[i, first + a] = 0.0
+        for b in range(k):
+            tr.x[i, first + a] += covariance[a, b] * pooled[b, k]
+            tr.P[i, first + a, first + b] = 0.5 * (covariance[a, b] + covariance[b, a])
+
+
+@njit(cache=True)
+def apply_constants(
+    tr: Tracks,
+    i: int,
+    s: Settings,
+    look: Look,
+    k: int,
+    sensor: SensorTable,
+    fix: FloatArray,
+    J: FloatArray,
+    mask: IntArray,
+) -> None:
+    """Take the constant errors off a new track's position, with their covariance: pos = fix - C e, e the errors."""
+    d = s.d
+    n = tr.x.shape[1]
+    first = n - s.n_constant
+    x, P = tr.x[i], tr.P[i]
+    C = fix_sensitivity(look, k, sensor, fix, J, mask, np.zeros(3))
+    full = np.zeros((d, n))
+    for p in range(len(sensor.constant)):
+        j = sensor.constant[p]
+        if j >= 0:
+            full[:, j] = C[:d, p]
+    for a in range(d):
+        for j in range(first, n):
+            x[a] -= full[a, j] * x[j]
+            tr.anchor[i, a] -= full[a, j] * x[j]
+    for a in range(d):
+        for b in range(d):
+            for j in range(first, n):
+                for m in range(first, n):
+                    P[a, b] += full[a, j] * P[j, m] * full[b, m]
+    for a in range(d):
+        for j in range(first, n):
+            acc = 0.0
+            for m in range(first, n):
+                acc += full[a, m] * P[m, j]
+            P[a, j] -= acc
+            P[j, a] = P[a, j]
+        if sensor.constant[TIME] >= 0:  # the target moved by an unknown velocity in the unknown time
+            lag = sensor.constant[TIME]
+            P[a, a] += s.speed_sigma**2 * (P[lag, lag] + x[lag] ** 2)
+            P[a, d + a] += s.speed_sigma**2 * x[lag]
+            P[d + a, a] = P[a, d + a]
+
+
+@njit(cache=True)
+def save_lesson(tr: Tracks, i: int, s: Settings) -> None:
+    """Keep what a track that ends, or becomes another, has learned of the constant errors."""
+    k = s.n_constant
+    if k == 0 or tr.life[i, 2] == 0.0:
+        return
+    info = np.empty((k, k))
+    vector = np.empty(k)
+    learned(tr.x[i], tr.P[i], tr.x.shape[1] - k, info, vector)
+    tr.bank[:, :k] += info - tr.told[i, :, :k]
+    tr.bank[:, k] += vector - tr.told[i, :, k]
+    tr.told[i, :, :k] = info
+    tr.told[i, :, k] = vector
+
+
+@njit(cache=True)
 def condition_on_rate(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int) -> None:
     """Give a new track what its first range rate tells of the velocity."""
     n = tr.x.shape[1]
@@ -605,7 +736,7 @@ def condition_on_rate(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look
     mask = np.empty(7, np.int64)
     mask[0] = 3
     linearise(tr.x[i], s.d, k, 0.0, look, sensor, zhat, H, h6)
-    innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, 1, y, S, PHt)
+    innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, 1, y, S, PHt, s.d, sensor.constant[TIME])
     apply_update(tr.x[i], tr.P[i], y, S, PHt, 1)
 
 
@@ -620,6 +751,7 @@ def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look) -> None:
         target = tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN]
         if tr.life[i, 2] > 0.0:
             if sensor.report_range == s.farthest_report and gap > (1.1 * sensor.report_range) ** 2:
+                save_lesson(tr, i, s)
                 tr.life[i, 2] = 0.0
         elif target > s.show_above and gap < sensor.report_range**2 and stands_apart(tr, i, s):
             tr.life[i, 2] = 1.0
@@ -647,8 +779,10 @@ def end_and_merge(tr: Tracks, s: Settings, merging: bool) -> None:
         w = tr.weight[i]
         target = w[VISIBLE] + w[HIDDEN]
         if target + w[STATIC] < s.delete_below:
+            save_lesson(tr, i, s)
             keep[i] = False
         elif target < s.hide_below:
+            save_lesson(tr, i, s)
             tr.life[i, 2] = 0.0
     order = np.argsort(tr.x[:n_tracks, 0])  # neighbours lie next to each other in the east
     for a in range(n_tracks if merging else 0):
@@ -660,6 +794,7 @@ def end_and_merge(tr: Tracks, s: Settings, merging: bool) -> None:
             if keep[j] and are_one(tr, i, j, s):
                 weaker = j if rank(tr, i) >= rank(tr, j) else i
                 keep[weaker] = False
+                save_lesson(tr, weaker, s)
     at = 0
     for i in range(n_tracks):
         if keep[i]:
@@ -671,6 +806,7 @@ def end_and_merge(tr: Tracks, s: Settings, merging: bool) -> None:
                 tr.anchor[at] = tr.anchor[i]
                 tr.anchor_P[at] = tr.anchor_P[i]
                 tr.life[at] = tr.life[i]
+                tr.told[at] = tr.told[i]
             at += 1
     tr.live[0] = at
 

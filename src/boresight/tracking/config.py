@@ -20,6 +20,11 @@ class SensorErrors:
     bias_elevation: float = 0.0  # rad
     bias_position: float = 0.0  # m, per axis
     bias_time: float = 20.0  # s
+    offset_time: float = 0.0  # s: standard deviations of constant errors, estimated on line (0: taken as exact)
+    offset_range: float = 0.0  # m
+    offset_scale: float = 0.0  # of range, 1
+    offset_azimuth: float = 0.0  # rad
+    offset_elevation: float = 0.0  # rad
     decorrelation: float = 0.0  # s: looks closer in time are not independent evidence that a target exists
     fade_range: float = float("inf")  # m: where the detection probability has fallen to half
     resolution: float = 0.0  # m: targets nearer to each other may give one detection together (ranging sensors)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import chi2
 
+from boresight.kernels.registration import AZIMUTH, ELEVATION, N_PARAMETERS, RANGE, SCALE, TIME
 from boresight.kernels.tracker import AZIMUTH_BINS, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_scan import scan_step
 from boresight.tracking.config import SensorErrors, TrackerConfig
@@ -41,6 +42,8 @@ def make_plan(
     sigma: list[float] = []
     tau: list[float] = []
     tables = []
+    constants = [np.full(N_PARAMETERS, -1, np.int64) for _ in sensors]  # filled when the number of biases is known
+    known: list[tuple[float, tuple[int, int]]] = []  # sigma, (sensor, parameter) of the constant errors
     for index, sensor in enumerate(sensors):
         errors = config.sensors.get(sensor.id, SensorErrors())
         bias = np.full(N_COMPONENTS, -1, np.int64)
@@ -53,6 +56,8 @@ def make_plan(
                 bias[component] = 2 * d + len(sigma)
                 sigma.append(value)
                 tau.append(errors.bias_time)
+        if used is None or index in used:
+            known += [(v, (index, p)) for p, v in _constants(sensor, errors, flat)]
         c = sensor.coverage
         span = c.azimuth[1] - c.azimuth[0]
         if span <= 0.0:
@@ -70,6 +75,7 @@ def make_plan(
                 elevation_high=c.elevation[1],
                 ranging=sensor.kind not in (SensorKind.INFRARED, SensorKind.OPTICAL),
                 bias=bias,
+                constant=constants[index],
                 decorrelation=errors.decorrelation,
                 fade_range=errors.fade_range,
                 resolution=errors.resolution,
@@ -77,6 +83,10 @@ def make_plan(
                 moves_tracks=errors.moves_tracks,
             )
         )
+    sigma += [value for value, _ in known]
+    tau += [math.inf] * len(known)
+    for place, (_, (index, parameter)) in enumerate(known):
+        constants[index][parameter] = 2 * d + len(sigma) - len(known) + place
     gates = np.array([0.0, *chi2.ppf(config.gate_probability, np.arange(1, 8))])
     settings = Settings(
         d=d,
@@ -98,6 +108,7 @@ def make_plan(
         hide_below=config.hide_below,
         bias_sigma=np.array(sigma),
         bias_tau=np.array(tau),
+        n_constant=len(known),
         farthest_report=max(
             [t.report_range for t in tables if t.ranging and (used is None or t.number in used)] or [0.0]
         ),
@@ -109,9 +120,28 @@ def make_plan(
     return Plan(settings, tuple(tables), 2 * d + len(sigma))
 
 
+def _constants(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[int, float]]:
+    """Return (parameter, sigma) of the constant errors that are declared and that what the sensor measures can show."""
+    measured = np.isfinite(sensor.sigma)
+    point = bool(measured[Component.EAST])
+    ranges = point or bool(measured[Component.RANGE])
+    return [
+        (parameter, value)
+        for parameter, value, shows in (
+            (TIME, errors.offset_time, True),
+            (RANGE, errors.offset_range, ranges),
+            (SCALE, errors.offset_scale, ranges),
+            (AZIMUTH, errors.offset_azimuth, point or bool(measured[Component.AZIMUTH])),
+            (ELEVATION, errors.offset_elevation, not flat and (point or bool(measured[Component.ELEVATION]))),
+        )
+        if value > 0.0 and shows
+    ]
+
+
 def empty_tracks(plan: Plan, capacity: int = 64) -> Tracks:
     """Return a table without tracks."""
     n = plan.n_states
+    k = plan.settings.n_constant
     clutter = np.zeros((len(plan.sensors), AZIMUTH_BINS + 1))
     for table in plan.sensors:
         clutter[table.number, :AZIMUTH_BINS] = table.clutter_per_scan / AZIMUTH_BINS
@@ -128,12 +158,14 @@ def empty_tracks(plan: Plan, capacity: int = 64) -> Tracks:
         life=np.zeros((capacity, 4)),
         last_look=np.full(len(plan.sensors), -np.inf),
         clutter=clutter,
+        told=np.zeros((capacity, k, k + 1)),
+        bank=np.zeros((k, k + 1)),
         undetected=np.full(1, plan.settings.targets_at_start),
         seen_range=np.zeros(len(plan.sensors)),
     )
 
 
-PER_TRACK = ("birth", "x", "P", "weight", "anchor", "anchor_P", "life")
+PER_TRACK = ("birth", "x", "P", "weight", "anchor", "anchor_P", "life", "told")
 
 
 def copy_tracks(tr: Tracks, capacity: int | None = None) -> Tracks:
