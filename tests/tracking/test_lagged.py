@@ -13,6 +13,7 @@ from boresight.tracking.config import TrackerConfig
 from boresight.tracking.output import Rows
 from boresight.tracking.run import run, track_rows, tracker_for
 from boresight.tracking.saved import arrays_of_state, state_of_arrays
+from boresight.tracking.tracker import Output, TrackerState
 from boresight.types import Axes, Coverage, Detections, Recording, Sensor, SensorKind, Site, TrackRows
 from tests.tracking.conftest import make_recording
 
@@ -38,7 +39,7 @@ def lone_target() -> Recording:
 
 def smoothed_of(recording: Recording, config: TrackerConfig) -> list[Rows]:
     rows: list[Rows] = []
-    run(tracker_for(recording, config), iter_scans(recording), smoothed=rows)
+    run(tracker_for(recording, config), iter_scans(recording), watch=lambda _, out: rows.extend(out.smoothed))
     return rows
 
 
@@ -106,9 +107,13 @@ def test_saved_half_way_it_goes_on_with_the_same_rows(harbour: Recording) -> Non
     scans = list(iter_scans(harbour))
     whole = track_rows(smoothed_of(harbour, config))
     first: list[Rows] = []
+
+    def keep(_: TrackerState, out: Output) -> None:
+        first.extend(out.smoothed)
+
     tracker = tracker_for(harbour, config)
-    state, _, _ = run(tracker, scans[:150], finish=False, smoothed=first)
-    run(tracker, scans[150:], state_of_arrays(arrays_of_state(state), tracker), smoothed=first)
+    state, _, _ = run(tracker, scans[:150], finish=False, watch=keep)
+    run(tracker, scans[150:], state_of_arrays(arrays_of_state(state), tracker), watch=keep)
     joined = track_rows(first)
     np.testing.assert_array_equal(joined.t, whole.t)
     np.testing.assert_array_equal(joined.position, whole.position)
@@ -121,9 +126,10 @@ def test_smoothing_gains_and_stays_honest() -> None:
         recording = make_recording(seed, duration=40.0)
         for lag, found in squares.items():
             config = TrackerConfig(q=0.01, smoothing_lag=lag)
-            smoothed: list[Rows] = []
-            _, rows, _ = run(tracker_for(recording, config), iter_scans(recording), smoothed=smoothed)
-            for target in score(recording, track_rows(smoothed if lag else rows)).targets:
+            rows = (
+                smoothed_of(recording, config) if lag else run(tracker_for(recording, config), iter_scans(recording))[1]
+            )
+            for target in score(recording, track_rows(rows)).targets:
                 found += target.squared_error
                 if lag and target.nees:
                     nees.append(np.mean(target.nees))

@@ -27,6 +27,7 @@ from boresight.types import FATES, DecisionRows, Recording, Results, Scan
 
 if TYPE_CHECKING:
     from boresight.tracking.output import Rows
+    from boresight.tracking.tracker import Output, TrackerState
 
 LONGEST_LAG = 600.0  # s
 BESIDE = "tracker.toml"  # a configuration that lies in the recording's folder is used unless --config names another
@@ -98,6 +99,8 @@ def track(
             f"wrote {output}: {counts['tracks']} tracks, {counts['rows']} rows, from {counts['reports']} reports "
             f"in {results.summary['seconds']:.2f} s"
         )
+        for c in results.summary.get("registration", []):
+            print(f"{c['sensor']}: {c['parameter']} {c['value']:.3g} ± {c['sigma']:.2g} (1σ): {c['verdict']}")
 
 
 def sensor_ids(recording: Recording, sensors: str | None) -> list[str] | None:
@@ -112,6 +115,7 @@ def sensor_ids(recording: Recording, sensors: str | None) -> list[str] | None:
 def track_recording(recording: Recording, config: TrackerConfig, sensors: list[str] | None = None) -> Results:
     """Track a recording in memory, with a progress bar on standard error where that is a terminal."""
     with _loading():
+        from boresight.tracking.registration import Diary
         from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
         from boresight.tracking.warm import warm
 
@@ -121,7 +125,14 @@ def track_recording(recording: Recording, config: TrackerConfig, sensors: list[s
     started = time.perf_counter()
     with _progress(len(scans)) as tick:
         smoothed: list[Rows] = []
-        state, rows, decisions = run(tracker, scans, progress=tick, smoothed=smoothed)
+        diary = Diary(tracker)
+
+        def watch(state: TrackerState, out: Output) -> None:
+            smoothed.extend(out.smoothed)
+            if tracker.plan.settings.n_constant:
+                diary.note(state)
+
+        state, rows, decisions = run(tracker, scans, progress=tick, watch=watch)
     seconds = time.perf_counter() - started
     tracks = track_rows(rows)
     fates = decision_rows(recording, tracker, decisions, state.names)
@@ -142,7 +153,12 @@ def track_recording(recording: Recording, config: TrackerConfig, sensors: list[s
         "parameters": parameters_of(config),
         "versions": versions(),
     }
-    return Results(tracks, fates, summary, track_rows(smoothed) if config.smoothing_lag is not None else None)
+    past = track_rows(smoothed) if config.smoothing_lag is not None else None
+    if not tracker.plan.settings.n_constant:
+        return Results(tracks, fates, summary, past)
+    diary.note(state, last=True)
+    summary["registration"] = [c._asdict() for c in diary.known[-1]]
+    return Results(tracks, fates, summary, past, diary.rows())
 
 
 def _fates(rows: DecisionRows) -> dict[str, int]:

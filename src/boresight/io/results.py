@@ -15,9 +15,29 @@ from boresight.errors import UserError, did_you_mean
 from boresight.io.files import read_text
 from boresight.io.paths import ENU, VELOCITY
 from boresight.io.table import NUMBER, TEXT, WHOLE, Table, nullable, read_table, write_table
-from boresight.types import FATES, NO_TRACK, STATUSES, DecisionRows, FloatArray, Recording, Results, TrackRows
+from boresight.types import (
+    FATES,
+    NO_TRACK,
+    STATUSES,
+    DecisionRows,
+    FloatArray,
+    Recording,
+    RegistrationRows,
+    Results,
+    TrackRows,
+)
 
 SMOOTHED = "smoothed.parquet"
+REGISTRATION = "registration.parquet"
+REGISTRATION_SCHEMA: dict[str, str] = {
+    "t_s": NUMBER,
+    "sensor": TEXT,
+    "parameter": TEXT,
+    "value": NUMBER,
+    "sigma": NUMBER,
+    "declared_sigma": NUMBER,
+    "verdict": TEXT,
+}
 COVARIANCE = {
     "cov_ee": (0, 0),
     "cov_en": (0, 1),
@@ -37,13 +57,15 @@ DECISION_SCHEMA: dict[str, str] = {"row": WHOLE, "fate": TEXT, "track_id": WHOLE
 
 
 def write_results(results: Results, recording: Recording, folder: Path) -> None:
-    """Write the three files (four with smoothed rows) into a folder that is there (see `files.output_folder`).
+    """Write the files of results into a folder that is there (see `files.output_folder`).
 
     summary.json gets the key `recording` (name, dimensions, site), so that results can be exported by themselves.
     """
     write_table(folder / "tracks.parquet", _track_columns(results.tracks))
     if results.smoothed is not None:
         write_table(folder / SMOOTHED, _track_columns(results.smoothed))
+    if results.registration is not None:
+        write_table(folder / REGISTRATION, _registration_columns(results.registration))
     write_table(folder / "decisions.parquet", _decision_columns(results.decisions))
     site = recording.site
     about = {
@@ -65,12 +87,13 @@ def read_results(path: Path | str) -> Results:
     if not folder.is_dir():
         what = "is a file, not a results folder" if folder.exists() else "no such results folder"
         raise UserError(f"{folder}: {what}")
-    past = folder / SMOOTHED
+    past, known = folder / SMOOTHED, folder / REGISTRATION
     return Results(
         _tracks(read_table(folder / "tracks.parquet", TRACK_SCHEMA, tuple(TRACK_SCHEMA)), causal=True),
         _decisions(read_table(folder / "decisions.parquet", DECISION_SCHEMA, tuple(DECISION_SCHEMA), others=True)),
         read_summary(folder / "summary.json"),
         _tracks(read_table(past, TRACK_SCHEMA, tuple(TRACK_SCHEMA)), causal=False) if past.is_file() else None,
+        _registration(read_table(known, REGISTRATION_SCHEMA, tuple(REGISTRATION_SCHEMA))) if known.is_file() else None,
     )
 
 
@@ -96,6 +119,32 @@ def _tracks(table: Table, causal: bool) -> TrackRows:
     velocity = [table.numbers(n, required=n != "vu_m_s") for n in VELOCITY]
     ids, status = table.whole("track_id"), _coded(table, "status", STATUSES)
     return TrackRows(t, known, ids, status, np.stack(position, 1), np.stack(velocity, 1), covariance)
+
+
+def _registration(table: Table) -> RegistrationRows:
+    words = {name: np.array(table.objects(name), dtype=object) for name in ("sensor", "parameter", "verdict")}
+    numbers = {name: table.numbers(name, required=True) for name in ("t_s", "value", "sigma", "declared_sigma")}
+    return RegistrationRows(
+        numbers["t_s"],
+        words["sensor"],
+        words["parameter"],
+        numbers["value"],
+        numbers["sigma"],
+        numbers["declared_sigma"],
+        words["verdict"],
+    )
+
+
+def _registration_columns(rows: RegistrationRows) -> dict[str, Any]:
+    return {
+        "t_s": rows.t,
+        "sensor": pa.array(rows.sensor.tolist(), pa.string()),
+        "parameter": pa.array(rows.parameter.tolist(), pa.string()),
+        "value": rows.value,
+        "sigma": rows.sigma,
+        "declared_sigma": rows.declared,
+        "verdict": pa.array(rows.verdict.tolist(), pa.string()),
+    }
 
 
 def _decisions(table: Table) -> DecisionRows:

@@ -41,6 +41,7 @@ class Tracks(NamedTuple):
     life: FloatArray  # (cap, 4) time of birth, time of last hit, shown (0 or 1), hits
     last_look: FloatArray  # (n_sensors,) s
     clutter: FloatArray  # (n_sensors, AZIMUTH_BINS + 1) mean false detections of a look, per azimuth bin and in all
+    heard: IntArray  # (cap,) bit i set: sensor i has moved the track
     told: FloatArray  # (cap, k, k + 1) what a track was told of the k constant sensor errors: information, vector
     bank: FloatArray  # (k, k + 1) what ended tracks had learned of them
     undetected: FloatArray  # (1,) expected number of targets that no track follows yet
@@ -342,8 +343,13 @@ def innovation(
 
 
 @njit(cache=True)
-def apply_update(x: FloatArray, P: FloatArray, y: FloatArray, L: FloatArray, PHt: FloatArray, m: int) -> None:
-    """Condition (x, P) on whitened innovations `y` with S = L L': P -= W W', W = P H' L^-T, exactly symmetric."""
+def apply_update(
+    x: FloatArray, P: FloatArray, y: FloatArray, L: FloatArray, PHt: FloatArray, m: int, considered: int
+) -> None:
+    """Condition (x, P) on whitened innovations `y` with S = L L': P -= W W', W = P H' L^-T, exactly symmetric.
+
+    States from `considered` on count with their covariance but learn nothing (Schmidt 1966): n for none.
+    """
     n = len(x)
     for i in range(m):
         for a in range(n):
@@ -351,11 +357,11 @@ def apply_update(x: FloatArray, P: FloatArray, y: FloatArray, L: FloatArray, PHt
             for k in range(i):
                 acc -= PHt[a, k] * L[i, k]
             PHt[a, i] = acc / L[i, i]
-    for a in range(n):
+    for a in range(considered):
         for i in range(m):
             x[a] += PHt[a, i] * y[i]
     for a in range(n):
-        for b in range(a + 1):
+        for b in range(min(a + 1, considered)):
             acc = P[a, b]
             for i in range(m):
                 acc -= PHt[a, i] * PHt[b, i]

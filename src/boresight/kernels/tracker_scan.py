@@ -403,7 +403,10 @@ def take(
         moving = moving_likelihood(tr, i, s, sensor, look, k, fix, fix_R, J, used)
         log_static += static_likelihood(tr, i, s, fix, fix_R, True) - moving
     if sensor.moves_tracks:
-        apply_update(tr.x[i], tr.P[i], y, S, PHt, c)
+        tr.heard[i] |= 1 << (sensor.number % 62)
+        # one sensor alone cannot show its own constant errors; where it seems to, linearisation deceives
+        alone = tr.heard[i] == 1 << (sensor.number % 62)
+        apply_update(tr.x[i], tr.P[i], y, S, PHt, c, n - s.n_constant if alone else n)
     weigh(tr, i, log_visible, log_static, temper)
     if sensor.ranging:
         allow_stop(tr, i, s)
@@ -624,6 +627,7 @@ def begin(
         w[STATIC] = born * s.static_share
         w[NOTHING] = 1.0 - born
         tr.birth[i] = look.row[k]
+        tr.heard[i] = 1 << (sensor.number % 62)
         tr.life[i, 0] = look.t + look.dt[k]
         tr.life[i, 1] = tr.life[i, 0]
         tr.life[i, 2] = 0.0
@@ -737,7 +741,7 @@ def condition_on_rate(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look
     mask[0] = 3
     linearise(tr.x[i], s.d, k, 0.0, look, sensor, zhat, H, h6)
     innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, 1, y, S, PHt, s.d, sensor.constant[TIME])
-    apply_update(tr.x[i], tr.P[i], y, S, PHt, 1)
+    apply_update(tr.x[i], tr.P[i], y, S, PHt, 1, n - s.n_constant)
 
 
 @njit(cache=True)
@@ -807,6 +811,7 @@ def end_and_merge(tr: Tracks, s: Settings, merging: bool) -> None:
                 tr.anchor_P[at] = tr.anchor_P[i]
                 tr.life[at] = tr.life[i]
                 tr.told[at] = tr.told[i]
+                tr.heard[at] = tr.heard[i]
             at += 1
     tr.live[0] = at
 

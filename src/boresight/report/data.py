@@ -14,13 +14,14 @@ from boresight.metrics.score import Score, score
 from boresight.report.consistency import nees_of, nis_of
 from boresight.report.places import places_of
 from boresight.report.thin import every, strides, whole
-from boresight.types import FATES, STATUSES, DecisionRows, Fate, Recording, Results, TrackRows
+from boresight.types import FATES, STATUSES, DecisionRows, Fate, Recording, RegistrationRows, Results, TrackRows
 
 MAX_TRACK_POINTS = 60_000
 MAX_DETECTIONS = 40_000
 MAX_TRUTH_POINTS = 20_000
 MAX_TARGET_CHARTS = 40
 MAX_ERROR_POINTS = 20_000
+MAX_REGISTRATION = 600  # points of one constant error
 TIME, PLACE = 100.0, 10.0  # times in 10 ms, places in 0.1 m
 
 
@@ -43,6 +44,8 @@ def collect(results: Results, recording: Recording | None) -> dict[str, Any]:
     }
     data["tracks"], data["track_step"] = _tracks(results.tracks, first)
     data["track_rows"] = len(results.tracks)
+    if results.registration is not None:
+        data["registration"] = _registration(results.registration, first)
     data["outcome"] = _outcome(results.decisions, recording)
     if recording is not None:
         data |= _recorded(recording, results, first, last)
@@ -101,6 +104,26 @@ def _outcome(decisions: DecisionRows, recording: Recording | None) -> list[dict[
         {"sensor": names[s], "fate": str(FATES[f]), "reason": known[w], "rows": n}
         for (s, f, w), n in zip(found.tolist(), counts.tolist(), strict=True)
     ]
+
+
+def _registration(rows: RegistrationRows, first: float) -> list[dict[str, Any]]:
+    """Each constant sensor error over time with its standard deviation, in the unit that its name ends with."""
+    out = []
+    keys = [f"{s} {p}" for s, p in zip(rows.sensor, rows.parameter, strict=True)]
+    for key in dict.fromkeys(keys):
+        k = np.flatnonzero(np.array(keys) == key)
+        keep = k[every(len(k), strides([len(k)], MAX_REGISTRATION))]
+        out.append(
+            {
+                "id": key,
+                "verdict": str(rows.verdict[k[-1]]),
+                "t": (rows.t[keep] - first).tolist(),
+                "v": rows.value[keep].tolist(),
+                "s": rows.sigma[keep].tolist(),
+                "declared": float(rows.declared[k[-1]]),
+            }
+        )
+    return out
 
 
 def _recorded(recording: Recording, results: Results, first: float, last: float) -> dict[str, Any]:

@@ -418,6 +418,16 @@ if (own) {
   }
 })();
 
+// ---------- registration
+(() => {
+  if (!(D.registration || []).length) return hide("registration-section");
+  for (const r of D.registration) {
+    const cell = make("div"), last = r.v.length - 1; $("registration").append(cell);
+    const lo = r.v.map((v, i) => v - 2 * r.s[i]), hi = r.v.map((v, i) => v + 2 * r.s[i]);
+    chart(cell, {title: `${r.id.replaceAll("_", " ")}: ${sig(r.v[last], 3)} ± ${sig(2 * r.s[last], 2)}, ${r.verdict}`, series: [{x: r.t, y: r.v, colour: "#0b6aa2", label: "estimate"}], bands: [{x: r.t, lo, hi, colour: "#0b6aa2", opacity: 0.16}], lines: [0], x: [0, span], y: [Math.min(-2 * r.declared, ...lo), Math.max(2 * r.declared, ...hi)], height: 150});
+  }
+})();
+
 // ---------- fates
 (() => {
   const names = [...new Set(D.outcome.map(r => r.sensor))], seen = D.fates.filter(f => D.outcome.some(r => r.fate === f));

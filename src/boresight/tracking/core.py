@@ -158,6 +158,7 @@ def empty_tracks(plan: Plan, capacity: int = 64) -> Tracks:
         life=np.zeros((capacity, 4)),
         last_look=np.full(len(plan.sensors), -np.inf),
         clutter=clutter,
+        heard=np.zeros(capacity, np.int64),
         told=np.zeros((capacity, k, k + 1)),
         bank=np.zeros((k, k + 1)),
         undetected=np.full(1, plan.settings.targets_at_start),
@@ -165,7 +166,7 @@ def empty_tracks(plan: Plan, capacity: int = 64) -> Tracks:
     )
 
 
-PER_TRACK = ("birth", "x", "P", "weight", "anchor", "anchor_P", "life", "told")
+PER_TRACK = ("birth", "x", "P", "weight", "anchor", "anchor_P", "life", "heard", "told")
 
 
 def copy_tracks(tr: Tracks, capacity: int | None = None) -> Tracks:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -10,22 +12,26 @@ from boresight.kernels.registration import AZIMUTH, ELEVATION, RANGE, SCALE, TIM
 from boresight.kernels.tracker import Tracks
 from boresight.kernels.tracker_scan import pooled_constants
 from boresight.tracking.core import Plan
+from boresight.tracking.tracker import Tracker, TrackerState
+from boresight.types import RegistrationRows
 
-NAMES = {
-    TIME: "time_offset_s",
-    RANGE: "range_offset_m",
-    SCALE: "range_scale",
-    AZIMUTH: "azimuth_offset_rad",
-    ELEVATION: "elevation_offset_rad",
+# name with its unit, and SI units in one of it
+PARAMETERS = {
+    TIME: ("time_offset_s", 1.0),
+    RANGE: ("range_offset_m", 1.0),
+    SCALE: ("range_scale", 1.0),
+    AZIMUTH: ("azimuth_offset_deg", math.pi / 180.0),
+    ELEVATION: ("elevation_offset_deg", math.pi / 180.0),
 }
+INTERVAL = 1.0  # s between two rows of one parameter
 OBSERVABLE, WEAKLY, NOT = "observable", "weakly observable", "not observable"
 
 
 class Constant(NamedTuple):
-    """One constant error of one sensor: reported minus true, with its standard deviation, SI."""
+    """One constant error of one sensor: reported minus true, with its standard deviation, in the parameter's unit."""
 
     sensor: str
-    parameter: str  # one of NAMES
+    parameter: str  # one of PARAMETERS, the unit at its end
     value: float
     sigma: float
     declared: float  # standard deviation before any report
@@ -55,14 +61,35 @@ def constants_of(tracks: Tracks, plan: Plan, sensor_ids: tuple[str, ...]) -> lis
                 a = state - first
                 declared = float(s.bias_sigma[len(s.bias_sigma) - k + a])
                 sigma = float(np.sqrt(covariance[a, a]))
-                out.append(
-                    Constant(
-                        sensor_ids[table.number],
-                        NAMES[parameter],
-                        float(mean[a]),
-                        sigma,
-                        declared,
-                        verdict_of(sigma, declared),
-                    )
-                )
+                name, unit = PARAMETERS[parameter]
+                verdict = verdict_of(sigma, declared)
+                value = float(mean[a]) / unit
+                out.append(Constant(sensor_ids[table.number], name, value, sigma / unit, declared / unit, verdict))
     return out
+
+
+@dataclass(slots=True)
+class Diary:
+    """What is known of the constant errors every second; call `note` from the `watch` of `run`."""
+
+    tracker: Tracker
+    times: list[float] = field(default_factory=list)
+    known: list[list[Constant]] = field(default_factory=list)
+
+    def note(self, state: TrackerState, last: bool = False) -> None:
+        """Remember what the state holds, at most once a second (`last`: in any case)."""
+        t = state.clock.arrival
+        if not self.times or t - self.times[-1] >= INTERVAL or last:
+            ids = tuple(s.id for s in self.tracker.sensors)
+            self.times.append(t)
+            self.known.append(constants_of(state.window.tracks, self.tracker.plan, ids))
+
+    def rows(self) -> RegistrationRows:
+        """Return everything noted as columns."""
+        flat = [(t, *c) for t, known in zip(self.times, self.known, strict=True) for c in known]
+        columns = list(zip(*flat, strict=True)) if flat else [()] * 7
+        t, sensor, parameter, value, sigma, declared, verdict = columns
+        words = [np.array(c, dtype=object) for c in (sensor, parameter, verdict)]
+        return RegistrationRows(
+            np.array(t), words[0], words[1], np.array(value), np.array(sigma), np.array(declared), words[2]
+        )

@@ -9,7 +9,7 @@ import numpy as np
 from boresight.frames.pose import pose_track
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.output import Rows
-from boresight.tracking.tracker import REASON, Decision, Tracker, TrackerState, track_ids
+from boresight.tracking.tracker import REASON, Decision, Output, Tracker, TrackerState, track_ids
 from boresight.types import (
     FATES,
     NO_TRACK,
@@ -44,11 +44,11 @@ def run(
     *,
     finish: bool = True,
     progress: Callable[[Scan], None] | None = None,
-    smoothed: list[Rows] | None = None,
+    watch: Callable[[TrackerState, Output], None] | None = None,
 ) -> tuple[TrackerState, list[Rows], list[Decision]]:
     """Step a tracker through scans in order of arrival, from `state` (a fresh one); consumes it.
 
-    Smoothed rows, where the tracker's settings ask for them, are added to the list `smoothed`.
+    `progress` is called with every scan taken, `watch` with the state and what the step gave, also at the end.
     """
     state = tracker.init() if state is None else state
     rows: list[Rows] = []
@@ -57,16 +57,16 @@ def run(
         state, out = tracker.step(state, scan)
         rows += out.rows
         decisions += out.decisions
-        if smoothed is not None:
-            smoothed += out.smoothed
+        if watch is not None:
+            watch(state, out)
         if progress is not None:
             progress(scan)
     if finish:
         state, out = tracker.finish(state)
         rows += out.rows
         decisions += out.decisions
-        if smoothed is not None:
-            smoothed += out.smoothed
+        if watch is not None:
+            watch(state, out)
     return state, rows, decisions
 
 

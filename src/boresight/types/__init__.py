@@ -2,7 +2,16 @@
 
 from boresight.types.enums import N_COMPONENTS, Axes, Component, Fate, SensorKind, TrackStatus
 from boresight.types.recording import Detections, Ignore, PlatformTrack, Recording, Truth
-from boresight.types.results import FATES, NO_TRACK, STATUSES, DecisionRows, Results, TrackRows, no_tracks
+from boresight.types.results import (
+    FATES,
+    NO_TRACK,
+    STATUSES,
+    DecisionRows,
+    RegistrationRows,
+    Results,
+    TrackRows,
+    no_tracks,
+)
 from boresight.types.scan import Scan
 from boresight.types.sensor import Coverage, FloatArray, Mount, Sensor, Site
 from boresight.types.state import GaussianState, Pose, UpdateInfo
@@ -25,6 +34,7 @@ __all__ = [
     "PlatformTrack",
     "Pose",
     "Recording",
+    "RegistrationRows",
     "Results",
     "Scan",
     "Sensor",

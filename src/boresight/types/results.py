@@ -48,6 +48,22 @@ class DecisionRows:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class RegistrationRows:
+    """Rows of `registration.parquet` as columns: what is known of the sensors' constant errors, over time."""
+
+    t: FloatArray  # (n,) s, arrival of the newest report used
+    sensor: NDArray[np.object_]  # (n,) str
+    parameter: NDArray[np.object_]  # (n,) str with the unit at its end; reported minus true
+    value: FloatArray  # (n,)
+    sigma: FloatArray  # (n,)
+    declared: FloatArray  # (n,) standard deviation before any report
+    verdict: NDArray[np.object_]  # (n,) str
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Results:
     """Everything that `boresight track` writes, in memory."""
 
@@ -55,6 +71,7 @@ class Results:
     decisions: DecisionRows
     summary: dict[str, Any]
     smoothed: TrackRows | None = None  # of the past, each row with what came up to its t_known (later than its t)
+    registration: RegistrationRows | None = None
 
 
 def no_tracks() -> TrackRows:
