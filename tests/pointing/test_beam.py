@@ -43,3 +43,29 @@ def test_rates_are_derivatives() -> None:
     assert aim.azimuth_rate == pytest.approx((a1[0] - a0[0]) / (2 * h), rel=1e-6)
     assert aim.elevation_rate == pytest.approx((a1[1] - a0[1]) / (2 * h), rel=1e-6)
     assert aim.sigma == pytest.approx(np.sqrt(2) * 5.0 / np.linalg.norm(p))
+
+
+@pytest.mark.parametrize("pole", list(Pole))
+def test_the_aim_is_what_the_frames_say(pole: Pole) -> None:
+    """Angles, covariance and direction cosines against `frames`, which are tested against other programs."""
+    from boresight.frames.array_face import angles_from_face, cosines_from_face
+    from boresight.frames.tangent import tangent_basis
+
+    rng = np.random.default_rng(21)
+    face = enu_from_face(1.0, 0.3, 0.2)
+    for _ in range(20):
+        p = 1e4 * (face @ [rng.uniform(-0.5, 0.5), 1.0, rng.uniform(-0.5, 0.5)])
+        A = rng.standard_normal((3, 3))
+        C, d = A @ A.T, p / np.linalg.norm(p)
+        aim = aim_at(p, A[0], C, face, pole, 0.01)
+        np.testing.assert_allclose([aim.azimuth, aim.elevation], azel_from_enu(*p)[:2], atol=1e-14)
+        np.testing.assert_allclose(
+            [aim.face_azimuth, aim.face_elevation], angles_from_face(face.T @ d, pole)[:2], atol=1e-14
+        )
+        np.testing.assert_allclose([aim.cosine_right, aim.cosine_up], cosines_from_face(face.T @ d), atol=1e-14)
+        T = tangent_basis(d)
+        np.testing.assert_allclose(aim.covariance, T @ C @ T.T / (p @ p), atol=1e-20)
+    up = aim_at(np.array([0.0, 0.0, 9.0]), A[0], C, face, pole, 0.01)
+    assert up.elevation == pytest.approx(np.pi / 2)
+    with pytest.raises(UserError, match="no direction"):
+        aim_at(np.zeros(3), A[0], C, face, pole, 0.01)

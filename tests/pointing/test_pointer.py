@@ -138,8 +138,9 @@ def test_the_orbit_is_keplers() -> None:
 
 def test_the_transition_is_the_flows_derivative() -> None:
     x = np.array([6.9e6, 1e5, 2e5, 100.0, 5e3, 5.5e3, 0.0, 0.0, 0.0])
-    F = np.empty((6, 6))
-    guide.advance(x.copy(), guide.ORBIT, 2.0, F)
+    w = np.zeros(guide.WORK)
+    guide.advance(x.copy(), guide.ORBIT, 2.0, w)
+    F = w[guide.F : guide.F + 6, :6]
     for j in range(6):
         h = 10.0 if j < 3 else 0.1
         a, b = x[:6].copy(), x[:6].copy()
@@ -155,3 +156,18 @@ def test_sources_that_say_nothing_are_refused() -> None:
         GuideSource("x")
     with pytest.raises(UserError, match="at least one"):
         GuideFilter(())
+
+
+def test_weights_are_shares_of_information() -> None:
+    """Radar at 8.4 km: 29 m across; own tracking 15 m; gps 10 m: shares by the inverse squares."""
+    rng, state = np.random.default_rng(36), POINTER.init()
+    feed(POINTER, state, np.arange(0.0, 5.0, 0.5), "rgo", rng)
+    state, out = POINTER.tick(state, 5.0)
+    assert out is not None
+    state.guide.scale[:] = 1.0
+    sigma = np.array([0.2 * DEG * out.aim.distance, 10.0, 0.1 * DEG * out.aim.distance])
+    np.testing.assert_allclose(POINTER.weights(state, out), sigma**-2 / np.sum(sigma**-2), rtol=1e-9)
+    late = out._replace(t=7.8)
+    feed(POINTER, state, np.array([7.0]), "g", rng)
+    state.guide.scale[:] = 1.0
+    np.testing.assert_allclose(POINTER.weights(state, late), [0.0, 1.0, 0.0])

@@ -12,22 +12,38 @@ from boresight.frames.local import ecef_from_enu_rotation
 from boresight.pointing.guide import GuideFilter, GuideSource
 from boresight.pointing.pointer import Pointer
 from boresight.service.feed import LONGEST, Feed, Stand
+from boresight.service.navigation import Navigation
 from boresight.types import Site
 
 SITE = Site(0.8, 0.15, 400.0)
 POINTER = Pointer(
     GuideFilter(
-        (GuideSource("radar", sigma_angle=3e-3, sigma_range=20.0), GuideSource("gps", sigma_position=10.0)), False, 1.0
+        (
+            GuideSource("radar", sigma_angle=3e-3, sigma_range=20.0),
+            GuideSource("gps", sigma_position=10.0),
+            GuideSource("other", correlation=2.0),
+        ),
+        False,
+        1.0,
     ),
     SITE,
-    (False, False),
+    (False, False, False),
 )
 GOOD = {"source": "radar", "t_s": 1000.0, "azimuth_deg": 30.0, "elevation_deg": 10.0, "range_m": 5000.0}
 PLACE = {"source": "gps", "t_s": 1000.0, "latitude_deg": 45.9, "longitude_deg": 8.6, "height_m": 900.0}
+TRACK = {
+    "source": "other", "t_s": 1000.0, "east_m": 1e3, "north_m": 2e3, "up_m": 5e2,
+    "ve_m_s": 9.0, "vn_m_s": 1.0, "vu_m_s": 0.0,
+    "covariance": [400.0, 90, 0, 1, 0, 0, 250.0, 0, 0, 1, 0, 900.0, 0, 0, 1, 9.0, 0, 0, 9.0, 0, 9.0],
+}  # fmt: skip
+SHIP = {
+    "platform": "ship", "t_s": 1000.0, "east_m": 1.0, "north_m": 2.0, "up_m": 0.0, "yaw_deg": 9.0, "pitch_deg": 1.0,
+    "roll_deg": -3.0,
+}  # fmt: skip
 
 
 def feed() -> Feed:
-    return Feed(POINTER, {"radar": Stand(), "gps": Stand()})
+    return Feed(POINTER, {"radar": Stand(), "gps": Stand(), "other": Stand()}, Navigation("ship", POINTER, 1.0))
 
 
 def line(**change: object) -> bytes:
@@ -42,7 +58,11 @@ def test_a_good_line_is_a_report() -> None:
     two = f.parse(line() + b"\n" + json.dumps(PLACE).encode() + b"\n", 1000.1)
     assert [r.source for r in two] == [0, 1]
     assert np.linalg.norm(two[1].z) > 6e6
-    (own,) = f.parse(b'{"source":"radar","t_s":1000,"face_az_deg":1,"face_el_deg":2}', 1000.0)
+    face = b'{"source":"radar","t_s":1000,"face_az_deg":1,"face_el_deg":2}'
+    assert f.parse(face, 1000.0) == []  # the face stands on a ship of which nothing is known
+    assert f.counts["no_navigation"] == 1
+    f.parse(json.dumps(SHIP).encode(), 1000.0)
+    (own,) = f.parse(face, 1000.0)
     assert math.isnan(own.z[2])
 
 
@@ -56,6 +76,10 @@ def test_every_mistake_has_its_name() -> None:
         (line(t_s=1e9), "bad_time"), (line(elevation_deg=91.0), "bad_value"), (line(range_m=-5.0), "bad_value"),
         (line(note="x" * LONGEST), "oversized"), (line(source="gps"), "bad_value"),
         (json.dumps({**PLACE, "latitude_deg": 99.0}).encode(), "bad_value"),
+        (json.dumps({**TRACK, "covariance": [1.0, 2.0]}).encode(), "bad_value"),
+        (json.dumps({**TRACK, "covariance": [1.0, 9.0, 0.0, 1.0, 0.0, 1.0]}).encode(), "bad_value"),
+        (json.dumps({**TRACK, "covariance": None}).encode(), "bad_value"),
+        (json.dumps({**TRACK, "ve_m_s": None}).encode(), "bad_value"),
     ):  # fmt: skip
         before = f.counts[name]
         assert f.parse(data, 1000.0) == []
@@ -64,7 +88,8 @@ def test_every_mistake_has_its_name() -> None:
 
 def test_a_hundred_thousand_mutants() -> None:
     rng = np.random.default_rng(40)
-    seeds = [line(), json.dumps(PLACE).encode(), line(range_m=None), b"", b"[" * 500, b"\x00" * 64]
+    seeds = [json.dumps(m).encode() for m in (GOOD, PLACE, TRACK, SHIP)]
+    seeds += [line(range_m=None), b"", b"[" * 500, b"\x00" * 64]
     f, state, taken = feed(), POINTER.init(), 0
     which, kinds = rng.integers(len(seeds), size=100_000), rng.integers(5, size=100_000)
     noise = rng.integers(256, size=(100_000, 3))
@@ -82,6 +107,7 @@ def test_a_hundred_thousand_mutants() -> None:
             data = data * (1 + noise[i, 0] % 40)
         for report in f.parse(bytes(data), 1000.0 + 1e-3 * i if i % 2 else 1000.0):
             assert np.isfinite(report.z[:2]).all()
+            assert np.isfinite(report.axes).all()
             taken += 1
             if taken % 5 == 0:
                 POINTER.take(state, *report)

@@ -33,6 +33,11 @@ _POLE_FROM_FACE = {
 }
 
 
+def pole_from_face(pole: Pole) -> FloatArray:
+    """Return the rotation (3, 3) from face axes to those whose azimuth and elevation are the system's angles."""
+    return _POLE_FROM_FACE[pole]
+
+
 def enu_from_face(azimuth: Input, elevation: Input, skew: Input = 0.0) -> FloatArray:
     """Return the rotation (..., 3, 3) whose columns are right, boresight, up of a face, in ENU (or body-like) axes.
 

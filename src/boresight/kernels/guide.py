@@ -21,6 +21,9 @@ LONGEST = 10.0  # s, of one step of the integration
 # What a report holds: azimuth, elevation, range (NaN: none) in its axes; ECEF x, y, z; these and maybe a velocity.
 DIRECTION, POSITION, TRACK = 0, 1, 2
 ORBIT, ACCELERATION = 0, 1  # dynamics
+# Rows of the one work array: a state then, an innovation, a report; matrices of 3, 3, 9, 6, 6, 6, 6 and 18 rows.
+THEN, Y, LOOK, B, A, F, H, G, S, R, W = 0, 1, 2, 3, 6, 9, 18, 24, 30, 36, 42
+WORK = (60, 12)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
@@ -59,31 +62,32 @@ def fly(x: FloatArray, dt: float) -> None:
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def advance(x: FloatArray, dynamics: int, dt: float, F: FloatArray) -> None:
-    """Advance a state in place by `dt` (s) and fill `F` (m, m), m = 6 or 9, with its transition."""
-    F[:] = 0.0
+def advance(x: FloatArray, dynamics: int, dt: float, w: FloatArray) -> None:
+    """Advance a state in place by `dt` (s) and fill rows F of `w` with its transition (6, 6) or (9, 9)."""
+    m = 6 if dynamics == ORBIT else 9
     h2 = 0.5 * dt * dt
-    for i in range(len(F)):
-        F[i, i] = 1.0
+    for i in range(m):
+        for j in range(m):
+            w[F + i, j] = 1.0 if i == j else 0.0
     if dt == 0.0:
         return
     if dynamics == ACCELERATION:
         for i in range(3):
-            F[i, 3 + i] = F[3 + i, 6 + i] = dt
-            F[i, 6 + i] = h2
+            w[F + i, 3 + i] = w[F + 3 + i, 6 + i] = dt
+            w[F + i, 6 + i] = h2
             x[i] += dt * x[3 + i] + h2 * x[6 + i]
             x[3 + i] += dt * x[6 + i]
         return
     r2 = x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
     k = MU / (r2 * math.sqrt(r2))
-    h3 = h2 * dt / 3.0
+    k3, h3 = 3.0 * k / r2, h2 * dt / 3.0
     for i in range(3):
         for j in range(3):
-            g = 3.0 * k * x[i] * x[j] / r2 - (k if i == j else 0.0)
-            F[i, j] += h2 * g
-            F[i, 3 + j] = h3 * g + (dt if i == j else 0.0)
-            F[3 + i, j] = dt * g
-            F[3 + i, 3 + j] += h2 * g
+            g = k3 * x[i] * x[j] - (k if i == j else 0.0)
+            w[F + i, j] += h2 * g
+            w[F + i, 3 + j] = h3 * g + (dt if i == j else 0.0)
+            w[F + 3 + i, j] = dt * g
+            w[F + 3 + i, 3 + j] += h2 * g
     fly(x, dt)
 
 
@@ -97,51 +101,47 @@ def noise(dynamics: int, q: float, dt: float, i: int, j: int) -> float:
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def carry(m: int, F: FloatArray, P: FloatArray, W: FloatArray) -> None:
-    """Set the block (m, m) of `P` to F P F'; call it with `m` a constant, so that the compiler unrolls its loops.
-
-    `W` (2m, >= m) is work space.
-    """
+def carry(m: int, P: FloatArray, w: FloatArray) -> None:
+    """Set the block (m, m) of `P` to F P F'; call it with `m` a constant, so that the compiler unrolls its loops."""
     for i in range(m):
         for j in range(m):
-            W[j, i] = F[i, j]
+            w[W + j, i] = w[F + i, j]
     for i in range(m):  # P F'
         for j in range(m):
-            W[m + i, j] = 0.0
+            w[W + m + i, j] = 0.0
         for k in range(m):
             a = P[i, k]
             for j in range(m):
-                W[m + i, j] += a * W[k, j]
+                w[W + m + i, j] += a * w[W + k, j]
     for i in range(m):
         for j in range(m):
             P[i, j] = 0.0
         for k in range(m):
-            a = F[i, k]
+            a = w[F + i, k]
             for j in range(m):
-                P[i, j] += a * W[m + k, j]
+                P[i, j] += a * w[W + m + k, j]
     for i in range(m):
         for j in range(i):
             P[i, j] = P[j, i]
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def predict(
-    x: FloatArray, P: FloatArray, n: int, dynamics: int, q: float, dt: float, F: FloatArray, W: FloatArray
-) -> None:
-    """Advance the first `n` of a state and covariance in place by `dt` >= 0; `F` (m, m), `W` (2m, n) are work space."""
-    m = len(F)
-    advance(x, dynamics, dt, F)
-    if m == 6:
-        carry(6, F, P, W)
+def predict(x: FloatArray, P: FloatArray, n: int, dynamics: int, q: float, dt: float, w: FloatArray) -> None:
+    """Advance the first `n` of a state and of its covariance in place by `dt` >= 0."""
+    advance(x, dynamics, dt, w)
+    if dynamics == ORBIT:
+        m = 6
+        carry(6, P, w)
     else:
-        carry(9, F, P, W)
+        m = 9
+        carry(9, P, w)
     for j in range(m, n):
         for i in range(m):
-            W[i, 0] = P[i, j]
+            w[W + i, 0] = P[i, j]
         for i in range(m):
             total = 0.0
             for k in range(m):
-                total += F[i, k] * W[k, 0]
+                total += w[F + i, k] * w[W + k, 0]
             P[i, j] = P[j, i] = total
     for i in range(m // 3):
         for j in range(m // 3):
@@ -151,8 +151,8 @@ def predict(
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def motion_axes(x: FloatArray, B: FloatArray) -> None:
-    """Fill `B` (3, 3) with columns along, across and up of the motion."""
+def motion_axes(x: FloatArray, w: FloatArray) -> None:
+    """Fill rows B of `w` (3, 3) with columns along, across and up of the motion."""
     r = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
     c0, c1, c2 = x[4] * x[2] - x[5] * x[1], x[5] * x[0] - x[3] * x[2], x[3] * x[1] - x[4] * x[0]
     c = math.sqrt(c0 * c0 + c1 * c1 + c2 * c2)
@@ -160,9 +160,9 @@ def motion_axes(x: FloatArray, B: FloatArray) -> None:
     if c < 1e-9 * r:
         c0, c1, c2, c = -u1, u0, 0.0, max(math.sqrt(u0 * u0 + u1 * u1), 1e-12)
     c0, c1, c2 = c0 / c, c1 / c, c2 / c
-    B[0, 0], B[1, 0], B[2, 0] = u1 * c2 - u2 * c1, u2 * c0 - u0 * c2, u0 * c1 - u1 * c0
-    B[0, 1], B[1, 1], B[2, 1] = c0, c1, c2
-    B[0, 2], B[1, 2], B[2, 2] = u0, u1, u2
+    w[B, 0], w[B + 1, 0], w[B + 2, 0] = u1 * c2 - u2 * c1, u2 * c0 - u0 * c2, u0 * c1 - u1 * c0
+    w[B, 1], w[B + 1, 1], w[B + 2, 1] = c0, c1, c2
+    w[B, 2], w[B + 1, 2], w[B + 2, 2] = u0, u1, u2
 
 
 @njit(cache=True)
@@ -175,69 +175,72 @@ def spin(t: float, a: FloatArray, out: FloatArray) -> None:
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def look_at(
     kind: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray, sigma: FloatArray, scale: float,
-    look: FloatArray, R: FloatArray,
+    w: FloatArray,
 ) -> int:  # fmt: skip
-    """Turn a report to the inertial frame, once for all hypotheses: `look` (7,), covariance `R` (6, 6); the dimension.
+    """Turn a report to the inertial frame, once for all hypotheses, into rows LOOK and R of `w`; the dimension.
 
-    A direction: where from, the unit vector there, range (m, NaN: none); `R` is diagonal, across (rad²) and along (m²).
-    A position or track: position, velocity; `R` is sigma² axes axes' (both turned to the inertial frame).
+    A direction: where from, the unit vector there, range (m, NaN: none); R is diagonal, across (rad²) and along (m²).
+    A position or track: position, velocity; R is sigma² axes axes' (both turned to the inertial frame).
     """
     c, s = math.cos(EARTH_RATE * t), math.sin(EARTH_RATE * t)
     a = sigma[0] * sigma[0] * scale
     if kind == DIRECTION:
-        look[0], look[1], look[2] = c * origin[0] - s * origin[1], s * origin[0] + c * origin[1], origin[2]
+        w[LOOK, 0], w[LOOK, 1], w[LOOK, 2] = c * origin[0] - s * origin[1], s * origin[0] + c * origin[1], origin[2]
         ce = math.cos(z[1])
         w0, w1, w2 = ce * math.sin(z[0]), ce * math.cos(z[0]), math.sin(z[1])
         u0 = axes[0, 0] * w0 + axes[0, 1] * w1 + axes[0, 2] * w2
         u1 = axes[1, 0] * w0 + axes[1, 1] * w1 + axes[1, 2] * w2
-        look[3], look[4] = c * u0 - s * u1, s * u0 + c * u1
-        look[5] = axes[2, 0] * w0 + axes[2, 1] * w1 + axes[2, 2] * w2
-        look[6] = z[2]
+        w[LOOK, 3], w[LOOK, 4] = c * u0 - s * u1, s * u0 + c * u1
+        w[LOOK, 5] = axes[2, 0] * w0 + axes[2, 1] * w1 + axes[2, 2] * w2
+        w[LOOK, 6] = z[2]
         for i in range(3):
             for j in range(3):
-                R[i, j] = 0.0
-        R[0, 0] = R[1, 1] = a
-        R[2, 2] = sigma[1] * sigma[1] * scale
+                w[R + i, j] = 0.0
+        w[R, 0] = w[R + 1, 1] = a
+        w[R + 2, 2] = sigma[1] * sigma[1] * scale
         return 2 if math.isnan(z[2]) else 3
-    look[0], look[1], look[2] = c * z[0] - s * z[1], s * z[0] + c * z[1], z[2]
+    w[LOOK, 0], w[LOOK, 1], w[LOOK, 2] = c * z[0] - s * z[1], s * z[0] + c * z[1], z[2]
     k = 3
     if kind == TRACK and len(z) > 3:
         k = 6
-        look[3], look[4] = c * z[3] - s * z[4] - EARTH_RATE * look[1], s * z[3] + c * z[4] + EARTH_RATE * look[0]
-        look[5] = z[5]
+        w[LOOK, 3], w[LOOK, 4] = (
+            c * z[3] - s * z[4] - EARTH_RATE * w[LOOK, 1],
+            s * z[3] + c * z[4] + EARTH_RATE * w[LOOK, 0],
+        )
+        w[LOOK, 5] = z[5]
     for i in range(k):
         for j in range(i, k):
             total = 0.0
             for b in range(k):
                 total += axes[i, b] * axes[j, b]
-            R[i, j] = R[j, i] = total * a
+            w[R + i, j] = w[R + j, i] = total * a
     for first in range(0, k, 3):
         for j in range(k):
-            x, y = R[first, j], R[first + 1, j]
-            R[first, j], R[first + 1, j] = c * x - s * y, s * x + c * y
+            x, y = w[R + first, j], w[R + first + 1, j]
+            w[R + first, j], w[R + first + 1, j] = c * x - s * y, s * x + c * y
     for first in range(0, k, 3):
         for i in range(k):
-            x, y = R[i, first], R[i, first + 1]
-            R[i, first], R[i, first + 1] = c * x - s * y, s * x + c * y
+            x, y = w[R + i, first], w[R + i, first + 1]
+            w[R + i, first], w[R + i, first + 1] = c * x - s * y, s * x + c * y
     return k
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def compare(p: FloatArray, v: FloatArray, kind: int, k: int, look: FloatArray, y: FloatArray, A: FloatArray) -> None:
-    """Fill innovation `y` (k,) and Jacobian `A` (3, 3) by position, at an inertial position and velocity (3,).
+def compare(kind: int, k: int, w: FloatArray) -> None:
+    """Fill rows Y (k,) and A (3, 3), the Jacobian by the position, for the state in row THEN and the report in LOOK.
 
     A direction is compared across the predicted line of sight (two small angles), so that no pole is special.
-    Rows of `y` beyond the third are velocities, whose Jacobian is one.
+    What is in Y beyond the third are velocities, whose Jacobian is one.
     """
     if kind != DIRECTION:
         for i in range(3):
-            y[i] = look[i] - p[i]
             for j in range(3):
-                A[i, j] = 1.0 if i == j else 0.0
-            if k > 3:
-                y[3 + i] = look[3 + i] - v[i]
+                w[A + i, j] = 1.0 if i == j else 0.0
+        for i in range(k):
+            w[Y, i] = w[LOOK, i] - w[THEN, i]
         return
-    d0, d1, d2 = p[0] - look[0], p[1] - look[1], p[2] - look[2]
+    d0, d1, d2 = w[THEN, 0] - w[LOOK, 0], w[THEN, 1] - w[LOOK, 1], w[THEN, 2] - w[LOOK, 2]
+    u0, u1, u2 = w[LOOK, 3], w[LOOK, 4], w[LOOK, 5]
     r = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
     e0, e1, e2 = d0 / r, d1 / r, d2 / r
     # two unit vectors across the line of sight
@@ -248,14 +251,14 @@ def compare(p: FloatArray, v: FloatArray, kind: int, k: int, look: FloatArray, y
         q = 1.0 / math.sqrt(e1 * e1 + e2 * e2)
         f0, f1, f2 = 0.0, -e2 * q, e1 * q
     g0, g1, g2 = e1 * f2 - e2 * f1, e2 * f0 - e0 * f2, e0 * f1 - e1 * f0
-    a = f0 * look[3] + f1 * look[4] + f2 * look[5]
-    b = g0 * look[3] + g1 * look[4] + g2 * look[5]
-    along = e0 * look[3] + e1 * look[4] + e2 * look[5]
+    a = f0 * u0 + f1 * u1 + f2 * u2
+    b = g0 * u0 + g1 * u1 + g2 * u2
+    along = e0 * u0 + e1 * u1 + e2 * u2
     across = math.sqrt(a * a + b * b)
     q = math.atan2(across, along) / across if across > 1e-12 else 1.0
-    y[0], y[1] = q * a, q * b
-    A[0, 0], A[0, 1], A[0, 2] = f0 / r, f1 / r, f2 / r
-    A[1, 0], A[1, 1], A[1, 2] = g0 / r, g1 / r, g2 / r
+    w[Y, 0], w[Y, 1] = q * a, q * b
+    w[A, 0], w[A, 1], w[A, 2] = f0 / r, f1 / r, f2 / r
+    w[A + 1, 0], w[A + 1, 1], w[A + 1, 2] = g0 / r, g1 / r, g2 / r
     if k == 3:
-        y[2] = look[6] - r
-        A[2, 0], A[2, 1], A[2, 2] = e0, e1, e2
+        w[Y, 2] = w[LOOK, 6] - r
+        w[A + 2, 0], w[A + 2, 1], w[A + 2, 2] = e0, e1, e2

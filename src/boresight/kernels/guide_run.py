@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from boresight.kernels.guide import ACCELERATION, EARTH_RATE, ORBIT, TRACK, advance, look_at, spin
-from boresight.kernels.guide_update import Work, bring_to, report_position, start, update, work_space
+from boresight.kernels.guide import ACCELERATION, EARTH_RATE, ORBIT, TRACK, WORK, advance, look_at, spin
+from boresight.kernels.guide_update import bring_to, report_position, start, update
 from boresight.types.sensor import FloatArray
 
 # Where a filter's settings and running numbers stand in their arrays.
@@ -29,7 +29,7 @@ def step(
     clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, scale: FloatArray, run_of: FloatArray,
     settings: FloatArray, spread: FloatArray, source: int, kind: int, t: float, z: FloatArray, origin: FloatArray,
     axes: FloatArray,
-    sigma: FloatArray, sigma_bias: FloatArray, work: Work,
+    sigma: FloatArray, sigma_bias: FloatArray, w: FloatArray,
 ) -> int:  # fmt: skip
     """Take one report into every hypothesis; returns ACCEPTED, REJECTED, WAITING (no start yet) or STALE.
 
@@ -40,10 +40,10 @@ def step(
     dynamics, q = int(settings[S_DYNAMICS]), settings[S_Q]
     if clock[C_STARTED] == 0.0 and not _begin(clock, X, P, L, dynamics, sigma_bias, spread, kind, t, z, origin, axes):
         return WAITING
-    _bring_all(clock, X, P, L, dynamics, q, t, work)
+    _bring_all(clock, X, P, L, dynamics, q, t, w)
     if t < clock[C_TIME] - settings[S_MAX_AGE]:
         return STALE
-    k = look_at(kind, t, z, origin, axes, sigma, scale[source], work[4], work[12])
+    k = look_at(kind, t, z, origin, axes, sigma, scale[source], w)
     best, m, lag = int(clock[C_BEST]), X.shape[1] - 3, t - clock[C_TIME]
     fate = REJECTED
     nis, share = 0.0, 0.0
@@ -51,7 +51,7 @@ def step(
         if L[h] <= RESTING:
             continue
         n = m if h == 0 else m + 3
-        e, l, s = update(X[h], P[h], n, lag, h == source + 1, dynamics, q, kind, k, settings[S_GATE], work)
+        e, l, s = update(X[h], P[h], n, lag, h == source + 1, dynamics, q, kind, k, settings[S_GATE], w)
         L[h] += l
         if h == best:
             nis, share = e, s
@@ -97,14 +97,14 @@ def _begin(
 
 @njit(cache=True)
 def _bring_all(
-    clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, dynamics: int, q: float, t: float, work: Work,
+    clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, dynamics: int, q: float, t: float, w: FloatArray,
 ) -> None:  # fmt: skip
     """Advance the hypotheses that do not rest to `t`, if that is later."""
     m = X.shape[1] - 3
     if t > clock[C_TIME]:
         for h in range(len(X)):
             if L[h] > RESTING:
-                bring_to(X[h], P[h], m if h == 0 else m + 3, clock[C_TIME], dynamics, q, t, work)
+                bring_to(X[h], P[h], m if h == 0 else m + 3, clock[C_TIME], dynamics, q, t, w)
         clock[C_TIME] = t
     clock[C_COUNT] += 1.0
 
@@ -141,7 +141,7 @@ def _weigh(clock: FloatArray, L: FloatArray) -> None:
 @njit(cache=True)
 def predict_to(
     clock: FloatArray, X: FloatArray, P: FloatArray, settings: FloatArray, t: float, position: FloatArray,
-    velocity: FloatArray, covariance: FloatArray, work: Work,
+    velocity: FloatArray, covariance: FloatArray, w: FloatArray,
 ) -> bool:  # fmt: skip
     """Fill ECEF position, velocity (3,) (against the turning Earth) and covariance (3, 3) at `t`; false before start.
 
@@ -155,9 +155,9 @@ def predict_to(
     x = X[best].copy()
     C = P[best].copy()
     if t >= clock[C_TIME]:
-        bring_to(x, C, m, clock[C_TIME], dynamics, q, t, work)
+        bring_to(x, C, m, clock[C_TIME], dynamics, q, t, w)
     else:
-        advance(x, dynamics, t - clock[C_TIME], work[5])
+        advance(x, dynamics, t - clock[C_TIME], w)
     c, s = math.cos(EARTH_RATE * t), math.sin(EARTH_RATE * t)
     position[0], position[1], position[2] = c * x[0] + s * x[1], c * x[1] - s * x[0], x[2]
     velocity[0] = c * x[3] + s * x[4] + EARTH_RATE * position[1]
@@ -189,15 +189,15 @@ def run(
     Fills (k, 3), (k, 3), (k, 3, 3) per node, NaN before the start, the hypothesis in use, and each report's fate.
     """
     row = 0
-    work = work_space(X.shape[1])
+    w = np.zeros(WORK)
     for k in range(len(t_node)):
         while row < len(t) and t_recv[row] <= t_node[k]:
             fate[row] = step(
                 clock, X, P, L, scale, run_of, settings, spread, source[row], kind[row], t[row], z[row], origin[row],
-                axes[row], sigma[row], sigma_bias, work,
+                axes[row], sigma[row], sigma_bias, w,
             )  # fmt: skip
             row += 1
-        if not predict_to(clock, X, P, settings, t_aim[k], position[k], velocity[k], covariance[k], work):
+        if not predict_to(clock, X, P, settings, t_aim[k], position[k], velocity[k], covariance[k], w):
             position[k] = velocity[k] = math.nan
             covariance[k] = math.nan
         best[k] = int(clock[C_BEST])

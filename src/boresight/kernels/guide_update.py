@@ -4,171 +4,168 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
-from boresight.kernels.guide import DIRECTION, LONGEST, advance, compare, motion_axes, noise, predict
+from boresight.kernels.guide import (
+    DIRECTION,
+    LONGEST,
+    ORBIT,
+    THEN,
+    A,
+    B,
+    F,
+    G,
+    H,
+    R,
+    S,
+    Y,
+    advance,
+    compare,
+    motion_axes,
+    noise,
+    predict,
+)  # fmt: skip
 from boresight.types.sensor import FloatArray
 
-Work = tuple[FloatArray, ...]
 LOG_TURN = math.log(2.0 * math.pi)
 CLIP = 30.0  # NIS beyond which a report says no more about a hypothesis than that it does not fit
 
 
-@njit(cache=True)
-def work_space(n: int) -> Work:
-    """Return the arrays in which `update` and `bring_to` work, for states of size n."""
-    m = n - 3
-    return (
-        np.zeros(n), np.zeros(3), np.zeros(3), np.zeros(6), np.zeros(7), np.zeros((m, m)), np.zeros((3, 3)),
-        np.zeros((3, 3)), np.zeros((6, n)), np.zeros((6, n)), np.zeros((6, 6)), np.zeros((2 * m, n)), np.zeros((6, 6)),
-    )  # fmt: skip
-
-
 @njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def spread(n: int, P: FloatArray, H: FloatArray, R: FloatArray, k: int, G: FloatArray, S: FloatArray) -> None:
-    """Fill `G` (k, n) with H P and `S` (k, k) with H P H' + R; call it with `n` a constant."""
+def spread(n: int, P: FloatArray, k: int, w: FloatArray) -> None:
+    """Fill rows G (k, n) with H P and S (k, k) with H P H' + R; call it with `n` a constant."""
     for i in range(k):
         for j in range(n):
-            G[i, j] = 0.0
+            w[G + i, j] = 0.0
         for c in range(n):
-            a = H[i, c]
+            a = w[H + i, c]
             for j in range(n):
-                G[i, j] += a * P[c, j]
+                w[G + i, j] += a * P[c, j]
     for i in range(k):
         for j in range(i, k):
-            total = R[i, j]
+            total = w[R + i, j]
             for c in range(n):
-                total += G[i, c] * H[j, c]
-            S[i, j] = S[j, i] = total
+                total += w[G + i, c] * w[H + j, c]
+            w[S + i, j] = w[S + j, i] = total
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def condition(
-    n: int, x: FloatArray, P: FloatArray, S: FloatArray, y: FloatArray, G: FloatArray, k: int, gate: float
-) -> tuple[float, float]:
-    """Whiten `y` and `G` by S = L L'; then x += G'y, P -= G'G, unless the NIS is beyond `gate`; NIS, log det S."""
-    log_det, nis = 0.0, 0.0
+def condition(n: int, x: FloatArray, P: FloatArray, k: int, gate: float, w: FloatArray) -> tuple[float, float]:
+    """Whiten Y and G by S = L L'; then x += G'y, P -= G'G, unless the NIS is beyond `gate`; NIS, det S."""
+    det, nis = 1.0, 0.0
     for j in range(k):
-        d = S[j, j]
+        d = w[S + j, j]
         for c in range(j):
-            d -= S[j, c] * S[j, c]
-        d = math.sqrt(d)
-        S[j, j] = d
-        log_det += 2.0 * math.log(d)
+            d -= w[S + j, c] * w[S + j, c]
+        det *= d
+        d = 1.0 / math.sqrt(d)
         for i in range(j + 1, k):
-            total = S[i, j]
+            total = w[S + i, j]
             for c in range(j):
-                total -= S[i, c] * S[j, c]
-            S[i, j] = total / d
+                total -= w[S + i, c] * w[S + j, c]
+            w[S + i, j] = total * d
         for c in range(j):
-            y[j] -= S[j, c] * y[c]
+            a = w[S + j, c]
+            w[Y, j] -= a * w[Y, c]
             for i in range(n):
-                G[j, i] -= S[j, c] * G[c, i]
-        y[j] /= d
+                w[G + j, i] -= a * w[G + c, i]
+        w[Y, j] *= d
         for i in range(n):
-            G[j, i] /= d
-        nis += y[j] * y[j]
+            w[G + j, i] *= d
+        nis += w[Y, j] * w[Y, j]
     if nis > gate:
-        return nis, log_det
+        return nis, det
     for j in range(k):
+        a = w[Y, j]
         for i in range(n):
-            x[i] += G[j, i] * y[j]
+            x[i] += w[G + j, i] * a
         for i in range(n):
-            a = G[j, i]
+            a = w[G + j, i]
             for c in range(n):
-                P[i, c] -= a * G[j, c]
-    return nis, log_det
+                P[i, c] -= a * w[G + j, c]
+    return nis, det
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def update(
     x: FloatArray, P: FloatArray, n: int, lag: float, biased: bool, dynamics: int, q: float, kind: int, k: int,
-    gate: float, work: Work,
+    gate: float, w: FloatArray,
 ) -> tuple[float, float, float]:  # fmt: skip
-    """Condition the first `n` of a state on a report (`look`, `R` of `look_at`, in `work`), in place.
+    """Condition the first `n` of a state on the report in `w` (`look_at`), in place.
 
     The report is valid `lag` (s, <= 0) from the state's time: the state is carried back, compared there, and the
     Jacobian carried forth: exact without process noise, which is added to R for the lag. Returns NIS, log-likelihood
     (NIS clipped) and the share of R in S (what an adaptive noise may learn from). Beyond `gate` the state stays.
     """
-    then, p, v, y, look, F, B, A, H, G, S, _, R = work
-    m = len(F)
-    then[:n] = x[:n]
-    advance(then, dynamics, lag, F)
-    for i in range(3):
-        p[i], v[i] = then[i], then[3 + i]
+    m = 6 if dynamics == ORBIT else 9
+    then = w[THEN]
+    for i in range(m):
+        then[i] = x[i]
+    advance(then, dynamics, lag, w)
     if biased:
-        motion_axes(then, B)
+        motion_axes(then, w)
         for i in range(3):
-            p[i] += B[i, 0] * x[m] + B[i, 1] * x[m + 1] + B[i, 2] * x[m + 2]
-    compare(p, v, kind, k, look, y, A)
-    _jacobian(A, F, B, biased, n, k, lag == 0.0, H)
+            then[i] += w[B + i, 0] * x[m] + w[B + i, 1] * x[m + 1] + w[B + i, 2] * x[m + 2]
+    compare(kind, k, w)
+    _jacobian(biased, m, n, k, w)
     if n == 6:
-        spread(6, P, H, R, k, G, S)
+        spread(6, P, k, w)
     elif n == 9:
-        spread(9, P, H, R, k, G, S)
+        spread(9, P, k, w)
     else:
-        spread(12, P, H, R, k, G, S)
-    share = 0.0
+        spread(12, P, k, w)
     if lag < 0.0:
-        _late(S, A, dynamics, q, -lag, k)
+        _late(dynamics, q, -lag, k, w)
+    share = 0.0
     for i in range(k):
-        share += R[i, i] / S[i, i] / k
+        share += w[R + i, i] / w[S + i, i]
     if n == 6:
-        nis, log_det = condition(6, x, P, S, y, G, k, gate)
+        nis, det = condition(6, x, P, k, gate, w)
     elif n == 9:
-        nis, log_det = condition(9, x, P, S, y, G, k, gate)
+        nis, det = condition(9, x, P, k, gate, w)
     else:
-        nis, log_det = condition(12, x, P, S, y, G, k, gate)
-    return nis, -0.5 * (min(nis, CLIP) + log_det + k * LOG_TURN), share
+        nis, det = condition(12, x, P, k, gate, w)
+    return nis, -0.5 * (min(nis, CLIP) + math.log(det) + k * LOG_TURN), share / k
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def _jacobian(
-    A: FloatArray, F: FloatArray, B: FloatArray, biased: bool, n: int, k: int, now: bool, H: FloatArray
-) -> None:
-    """Fill `H` (k, n) by the present state, of `A` (3, 3) by the position then and the transition `F` to then."""
-    m = len(F)
+def _jacobian(biased: bool, m: int, n: int, k: int, w: FloatArray) -> None:
+    """Fill rows H (k, n) by the present state, of A by the position then and the transition F to then."""
     for i in range(min(k, 3)):
-        if now:
-            for j in range(m):
-                H[i, j] = A[i, j] if j < 3 else 0.0
-        else:
-            for j in range(m):
-                H[i, j] = A[i, 0] * F[0, j] + A[i, 1] * F[1, j] + A[i, 2] * F[2, j]
-        for j in range(m, n):
-            b = j - m
-            H[i, j] = A[i, 0] * B[0, b] + A[i, 1] * B[1, b] + A[i, 2] * B[2, b] if biased else 0.0
-    for i in range(3, k):
+        a, b, c = w[A + i, 0], w[A + i, 1], w[A + i, 2]
         for j in range(m):
-            H[i, j] = F[i, j]
+            w[H + i, j] = a * w[F, j] + b * w[F + 1, j] + c * w[F + 2, j]
         for j in range(m, n):
-            H[i, j] = 0.0
+            w[H + i, j] = a * w[B, j - m] + b * w[B + 1, j - m] + c * w[B + 2, j - m] if biased else 0.0
+    for i in range(3, k):
+        for j in range(n):
+            w[H + i, j] = w[F + i, j] if j < m else 0.0
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def _late(S: FloatArray, A: FloatArray, dynamics: int, q: float, lag: float, k: int) -> None:
-    """Add the process noise of `lag` (s) to `S`: what moved the target since. Backwards its cross term is negative."""
+def _late(dynamics: int, q: float, lag: float, k: int, w: FloatArray) -> None:
+    """Add the process noise of `lag` (s) to S: what moved the target since. Backwards its cross term is negative."""
     pp = noise(dynamics, q, lag, 0, 0)
     for i in range(min(k, 3)):
         for j in range(min(k, 3)):
-            S[i, j] += pp * (A[i, 0] * A[j, 0] + A[i, 1] * A[j, 1] + A[i, 2] * A[j, 2])
+            w[S + i, j] += pp * (w[A + i, 0] * w[A + j, 0] + w[A + i, 1] * w[A + j, 1] + w[A + i, 2] * w[A + j, 2])
     if k > 3:
         pv, vv = noise(dynamics, q, lag, 0, 1), noise(dynamics, q, lag, 1, 1)
         for i in range(3):
-            S[i, 3 + i] -= pv
-            S[3 + i, i] -= pv
-            S[3 + i, 3 + i] += vv
+            w[S + i, 3 + i] -= pv
+            w[S + 3 + i, i] -= pv
+            w[S + 3 + i, 3 + i] += vv
 
 
 @njit(cache=True)
-def bring_to(x: FloatArray, P: FloatArray, n: int, now: float, dynamics: int, q: float, t: float, work: Work) -> None:
+def bring_to(
+    x: FloatArray, P: FloatArray, n: int, now: float, dynamics: int, q: float, t: float, w: FloatArray
+) -> None:
     """Advance the first `n` of a state, and its covariance, in place from `now` to time `t` (s) if that is later."""
     left = t - now
     while left > 0.0:
         step = min(left, LONGEST)
-        predict(x, P, n, dynamics, q, step, work[5], work[11])
+        predict(x, P, n, dynamics, q, step, w)
         left -= step
 
 

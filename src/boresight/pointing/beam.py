@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from boresight.errors import UserError
-from boresight.frames.array_face import Pole, angles_from_face
-from boresight.frames.azel import azel_from_enu, azel_from_enu_jacobian
-from boresight.frames.tangent import tangent_basis, unit
+from boresight.frames.array_face import Pole, pole_from_face
+from boresight.kernels.aim import aim as aim_kernel
 from boresight.types.sensor import FloatArray
 
 _COS2 = np.cos(np.linspace(0.0, 2.0 * np.pi, 256, endpoint=False)) ** 2
@@ -21,12 +21,15 @@ class Aim(NamedTuple):
     """Where to point at one time (rad, rad/s)."""
 
     direction: FloatArray  # (3,) unit, station ENU
+    distance: float  # m
     azimuth: float
     elevation: float
     azimuth_rate: float
     elevation_rate: float
     face_azimuth: float
     face_elevation: float
+    cosine_right: float  # direction cosines in the face
+    cosine_up: float
     covariance: FloatArray  # (2, 2) rad², right and up across the line of sight
     sigma: float  # rad, root mean square of the two
     p_in_beam: float
@@ -38,8 +41,8 @@ def probability_in_beam(covariance: ArrayLike, radius: float) -> float:
     In polar coordinates the radius integrates in closed form: P = 1/(2π √det S) ∮ (1 − exp(−½ g ρ²))/g dφ with
     g = e'S⁻¹e; the periodic integral over φ by 256 even points. Raises UserError for a covariance that is none.
     """
-    S = np.asarray(covariance, dtype=np.float64)
-    mean, half = 0.5 * float(S[0, 0] + S[1, 1]), float(np.hypot(0.5 * (S[0, 0] - S[1, 1]), S[0, 1]))
+    (a, b), (_, c) = np.asarray(covariance, dtype=np.float64).tolist()
+    mean, half = 0.5 * (a + c), math.hypot(0.5 * (a - c), b)
     values = (mean - half, mean + half)
     if not (-1e-12 * values[1] <= values[0] < np.inf):
         raise UserError("the direction's covariance is not positive")
@@ -74,16 +77,14 @@ def aim_at(
 ) -> Aim:
     """Return the aim at a target `to_target` (3,) from the antenna, moving with `velocity` (3,), all station ENU.
 
-    `covariance` (3, 3) is of the target's position (m²).
+    `covariance` (3, 3) is of the target's position (m²). Raises UserError for a target without a direction.
     """
-    d = unit(to_target)
-    r = float(np.linalg.norm(to_target))
-    T = tangent_basis(d)
-    S = T @ covariance @ T.T / (r * r)
-    azimuth, elevation, _ = azel_from_enu(*(float(v) for v in d))
-    rates = azel_from_enu_jacobian(*to_target)[:2] @ velocity
-    face_azimuth, face_elevation, _ = angles_from_face(enu_from_face.T @ d, pole)
+    a = aim_kernel(to_target, velocity, covariance, enu_from_face, pole_from_face(pole))
+    if math.isnan(a[0]):
+        raise UserError(f"a target at {to_target.tolist()} m from the antenna has no direction")
+    azimuth, elevation, azimuth_rate, elevation_rate, face_azimuth, face_elevation, right, up = a[3:11].tolist()
+    S, distance = a[11:].reshape(2, 2), math.sqrt(float(to_target @ to_target))
     return Aim(
-        d, azimuth, elevation, float(rates[0]), float(rates[1]), float(face_azimuth), float(face_elevation), S,
-        float(np.sqrt(np.trace(S))), probability_in_beam(S, beam_radius),
+        a[:3], distance, azimuth, elevation, azimuth_rate, elevation_rate, face_azimuth, face_elevation, right, up, S,
+        math.sqrt(a[11] + a[14]), probability_in_beam(S, beam_radius),
     )  # fmt: skip

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from boresight.errors import UserError
 from boresight.kernels import guide_run as kernel
-from boresight.kernels.guide import DIRECTION, POSITION, TRACK
-from boresight.kernels.guide_update import work_space
+from boresight.kernels.guide import DIRECTION, POSITION, TRACK, WORK
 from boresight.types.sensor import FloatArray
 
 Fates = NDArray[np.int64]
@@ -91,7 +90,7 @@ class GuideState(NamedTuple):
     scale: FloatArray  # (s,) learned factor on each source's variance
     run_of: FloatArray
     looked: FloatArray  # (s,) s, validity of the last track taken of each source
-    work: tuple[FloatArray, ...]
+    work: FloatArray
 
 
 class Predicted(NamedTuple):
@@ -153,7 +152,7 @@ class GuideFilter:
         n, h = (9 if self.orbit else 12), 1 + len(self.sources)
         return GuideState(
             np.zeros(kernel.N_CLOCK), np.zeros((h, n)), np.zeros((h, n, n)), np.zeros(h), np.ones(h - 1),
-            np.zeros(h - 1), np.full(h - 1, -math.inf), work_space(n),
+            np.zeros(h - 1), np.full(h - 1, -math.inf), np.zeros(WORK),
         )  # fmt: skip
 
     def step(

@@ -15,6 +15,8 @@ from boresight.frames.array_face import Pole, enu_from_face
 from boresight.frames.azel import azel_from_enu
 from boresight.frames.local import ecef_from_enu, ecef_from_enu_rotation
 from boresight.frames.tangent import direction_from_tangent
+from boresight.kernels.guide import TRACK
+from boresight.kernels.guide_run import ACCEPTED, C_BEST
 from boresight.pointing.beam import Aim, aim_at
 from boresight.pointing.guide import EYE, NONE, THINNED, GuideFilter, GuideState
 from boresight.types import Site
@@ -80,7 +82,8 @@ class Pointer:
     def init(self) -> PointerState:
         """Return the state before the first report."""
         n = len(self.own)
-        return PointerState(self.guide.init(), np.full(n, -math.inf), np.full(n, -math.inf), Mode.COAST, -math.inf, 0)
+        never = np.full(n, -math.inf)
+        return PointerState(self.guide.init(), never, never.copy(), np.full(n, math.inf), Mode.COAST, -math.inf, 0)
 
     def allowed(self, source: int) -> bool:
         """Return whether a source may steer by the choice made by hand."""
@@ -99,7 +102,9 @@ class Pointer:
         if not self.allowed(source):
             return -1
         fate = self.guide.step(state.guide, source, t, z, origin, axes)
-        if fate in (0, THINNED):
+        if fate in (ACCEPTED, THINNED):
+            if self.guide.sources[source].kind == TRACK:
+                state.spread[source] = math.sqrt(float(np.sum(axes[:3] ** 2)) / 3.0)
             if t - state.last[source] > self.stale:
                 state.since[source] = t
             state.last[source] = max(state.last[source], t)
@@ -137,7 +142,8 @@ class Pointer:
         if place is None:
             return state, Pointing(t, t + self.lead, aim, mode, aim.azimuth, aim.elevation)
         if math.isnan(place.enu_from_mount[0, 0]):
-            blind = aim._replace(face_azimuth=math.nan, face_elevation=math.nan, p_in_beam=math.nan)
+            no = math.nan
+            blind = aim._replace(face_azimuth=no, face_elevation=no, cosine_right=no, cosine_up=no, p_in_beam=no)
             return state, Pointing(t, t + self.lead, blind, Mode.NO_ATTITUDE, math.nan, math.nan)
         on_board = (float(v) for v in unit_of(aim.azimuth, aim.elevation) @ place.enu_from_mount)
         azimuth, elevation, _ = azel_from_enu(*on_board)
@@ -147,15 +153,29 @@ class Pointer:
         """Return how old each source's last good report is (s), infinite before the first."""
         return t - state.last
 
+    def weights(self, state: PointerState, out: Pointing) -> FloatArray:
+        """Return each source's share (s,) in a command: of one report's information across the line of sight.
+
+        By the learned variance of each source; none for one that is not fresh or is held to be biased.
+        """
+        sources = self.guide.sources
+        angle = np.array([s.sigma_angle * out.aim.distance for s in sources])
+        sigma = np.where(angle > 0.0, angle, [s.sigma_position for s in sources])
+        sigma = np.where(sigma > 0.0, sigma, state.spread)
+        fresh = out.t - state.last <= self.stale
+        biased = np.arange(1, len(sources) + 1) == int(state.guide.clock[C_BEST])
+        share = np.where(fresh & ~biased, 1.0 / (state.guide.scale * sigma**2), 0.0)
+        return share / max(float(share.sum()), 1e-300)
+
     def _mode(self, state: PointerState, t: float, aim: Aim) -> Mode:
-        fresh = t - state.last <= self.stale
-        own = np.array(self.own)
-        guides = fresh & ~own
-        if guides.any():
-            settled = bool((guides & (t - state.since >= self.settle)).any())
-            if settled or state.mode == Mode.FUSED or not (fresh & own).any():
+        fresh = [t - last <= self.stale for last in state.last.tolist()]
+        guides = [i for i, own in enumerate(self.own) if fresh[i] and not own]
+        tracking = any(f and own for f, own in zip(fresh, self.own, strict=True))
+        if guides:
+            settled = any(t - state.since[i] >= self.settle for i in guides)
+            if settled or state.mode == Mode.FUSED or not tracking:
                 return Mode.FUSED
-        if (fresh & own).any():
+        if tracking:
             return Mode.OWN
         return Mode.SEARCH if aim.p_in_beam < self.search_below else Mode.COAST
 
@@ -175,11 +195,16 @@ def _geometry(site: Site, face: tuple[float, float, float]) -> tuple[FloatArray,
 
 
 class PointerState(NamedTuple):
-    """All that changes. `last` and `since` (s,): last good report of each source, and since when it has been fresh."""
+    """All that changes.
+
+    `last` and `since` (s,): last good report of each source, and since when it has been fresh; `spread` (s,): m per
+    axis, of the last track of a source of tracks.
+    """
 
     guide: GuideState
     last: FloatArray
     since: FloatArray
+    spread: FloatArray
     mode: Mode
     search_begun: float
     searched: int

@@ -51,7 +51,7 @@ def run_live(
         rotator = Rotator(file.output.rotctld, station.mount, band, period)
     elements = Elements(pointer, station.elements)
     state, begun = _warm(pointer), clock()
-    tick, ticks, latency, busy = begun, 0, 0.0, time.process_time()
+    tick, ticks, latency, total, answers, busy = begun, 0, 0.0, 0.0, 0, time.process_time()
     arrived = math.nan
     try:
         while not stop() and (duration is None or clock() - begun < duration):
@@ -74,7 +74,8 @@ def run_live(
                 if rotator is not None:
                     rotator.follow(pointing.mount_azimuth, pointing.mount_elevation, now)
                 if not math.isnan(arrived):
-                    latency = max(latency, clock() - arrived) if ticks else 0.0
+                    took = clock() - arrived if ticks else 0.0
+                    latency, total, answers = max(latency, took), total + took, answers + (ticks > 0)
                 ticks += 1
                 arrived = math.nan
             if status is not None and pointing is not None:
@@ -96,7 +97,12 @@ def run_live(
         if status is not None:
             status.write("\n")
     spent, wall = time.process_time() - busy, max(clock() - begun, 1e-9)
-    found: dict[str, Any] = {"ticks": ticks, "latency_max_s": latency, "core_share": spent / wall, **feed.counts}
+    told = {"latency_mean_s": total / max(answers, 1), "latency_max_s": latency, "core_share": spent / wall}
+    found: dict[str, Any] = {
+        "ticks": ticks,
+        **told,
+        **feed.counts,
+    }
     return found | ({f"rotator_{k}": v for k, v in rotator.counts.items()} if rotator else {})
 
 
@@ -109,17 +115,19 @@ def encode(p: Pointing) -> bytes:
         "mount_az_deg": p.mount_azimuth, "mount_el_deg": p.mount_elevation,
     }  # fmt: skip
     row = {"t_s": p.t, "t_aim_s": p.t_aim, **{k: math.degrees(v) for k, v in degrees.items()}}
+    row |= {"face_u": a.cosine_right, "face_v": a.cosine_up}
     return msgspec.json.encode({**row, "p_in_beam": a.p_in_beam, "mode": str(p.mode)}) + b"\n"
 
 
 def status_line(
     pointer: Pointer, state: PointerState, p: Pointing, rotator: Rotator | None, carrier: Navigation | None = None
 ) -> str:
-    """Return the line that says how it goes: mode, aim, error, each source's age and learned sigma factor."""
-    ages = pointer.ages(state, p.t)
+    """Return the line that says how it goes: mode, aim, error, each source's age, weight and learned sigma factor."""
+    ages, weights = pointer.ages(state, p.t), pointer.weights(state, p)
+    rows = zip(pointer.guide.sources, ages, weights, state.guide.scale, strict=True)
     sources = "  ".join(
-        f"{s.id} {'–' if math.isinf(age) else f'{age:.1f}s'} ×{math.sqrt(scale):.2f}"
-        for s, age, scale in zip(pointer.guide.sources, ages, state.guide.scale, strict=True)
+        f"{s.id} {'–' if math.isinf(age) else f'{age:.1f}s'} {100.0 * weight:.0f}% ×{math.sqrt(scale):.2f}"
+        for s, age, weight, scale in rows
     )
     best = int(state.guide.clock[3])
     biased = f"  {pointer.guide.sources[best - 1].id} is biased" if best else ""
