@@ -20,7 +20,7 @@ LEVELS = [
     {"stages"},
     {"pipeline"},
     {"config"},
-    {"cli", "report", "papers", "service"},
+    {"cli", "report", "papers", "service", "study"},
 ]
 LEVEL = {name: i for i, names in enumerate(LEVELS) for name in names}
 # The shells may call each other: a command writes a report, prints a paper's table.

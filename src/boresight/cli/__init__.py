@@ -27,6 +27,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "tune": ("boresight.cli.tune:tune", "Find process and measurement noise from a recording's innovations."),
     "score": ("boresight.cli.score:score_command", "Score tracks against the truth of their recording."),
     "compare": ("boresight.cli.compare:compare", "Run several configurations on one recording, side by side."),
+    "study": ("boresight.cli.study:study", "Run a scenario many times over a grid of parameters, on all cores."),
     "report": ("boresight.cli.report:report", "Write a page that shows what the tracker did."),
     "play": ("boresight.cli.play:play", "Replay tracks in the terminal, or as GIF, MP4 or PNG."),
     "info": ("boresight.cli.info:info", "Say what is in a recording."),

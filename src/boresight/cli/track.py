@@ -114,7 +114,7 @@ def sensor_ids(recording: Recording, sensors: str | None) -> list[str] | None:
 
 def track_recording(recording: Recording, config: TrackerConfig, sensors: list[str] | None = None) -> Results:
     """Track a recording in memory, with a progress bar on standard error where that is a terminal."""
-    with _loading():
+    with loading():
         from boresight.tracking.registration import Diary
         from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
         from boresight.tracking.warm import warm
@@ -183,7 +183,7 @@ def versions() -> dict[str, str]:
 
 
 @contextlib.contextmanager
-def _loading() -> Iterator[None]:
+def loading() -> Iterator[None]:
     """Say that kernels are loaded, and that the first run compiles them, while that goes on."""
     from boresight.tracking.cache import compiled
 

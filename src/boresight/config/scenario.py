@@ -139,8 +139,12 @@ class ScenarioTable(TableModel, frozen=True):
 
 def read_scenario(path: Path | str, seed: int | None = None) -> tuple[Scenario, int]:
     """Read and check a scenario; returns it with its seed (the file's, or `seed`). Raises UserError."""
-    where = str(path)
-    table = convert(read_toml(path), ScenarioTable, where)
+    return scenario_of(read_toml(path), str(path), seed)
+
+
+def scenario_of(data: dict[str, Any], where: str, seed: int | None = None) -> tuple[Scenario, int]:
+    """Check a scenario's tables, called `where` in errors; as `read_scenario`."""
+    table = convert(data, ScenarioTable, where)
     if table.dimensions not in (2, 3):
         raise UserError(f"{where}: dimensions = {table.dimensions}; give 2 or 3")
     chosen = table.seed if seed is None else seed

@@ -115,7 +115,12 @@ class ConfigTable(TableModel, frozen=True):
 
 def read_tracker_config(path: Path, sensor_ids: list[str]) -> TrackerConfig:
     """Read a tracker configuration for a recording with these sensors; raises UserError with file and key."""
-    table = convert(read_toml(path), ConfigTable, str(path))
+    return tracker_config_of(read_toml(path), str(path), sensor_ids)
+
+
+def tracker_config_of(data: dict[str, Any], path: str, sensor_ids: list[str]) -> TrackerConfig:
+    """Check a tracker configuration's tables, called `path` in errors; as `read_tracker_config`."""
+    table = convert(data, ConfigTable, path)
     sensors = {}
     for item in table.sensor:
         if item.id not in sensor_ids:
