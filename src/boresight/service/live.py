@@ -23,6 +23,7 @@ from boresight.service.sockets import Broadcast, Input, Serial, Tcp, Udp, addres
 from boresight.types import Axes
 
 POLL = 0.005  # s between looks at inputs that cannot be waited for
+SHOW = 0.1  # s between status lines
 
 
 def run_live(
@@ -52,7 +53,7 @@ def run_live(
     elements = Elements(pointer, station.elements)
     state, begun = _warm(pointer), clock()
     tick, ticks, latency, total, answers, busy = begun, 0, 0.0, 0.0, 0, time.process_time()
-    arrived = math.nan
+    arrived, shown = math.nan, -math.inf
     try:
         while not stop() and (duration is None or clock() - begun < duration):
             now = clock()
@@ -78,7 +79,8 @@ def run_live(
                     latency, total, answers = max(latency, took), total + took, answers + (ticks > 0)
                 ticks += 1
                 arrived = math.nan
-            if status is not None and pointing is not None:
+            if status is not None and pointing is not None and now >= shown + SHOW:
+                shown = now
                 status.write("\r" + status_line(pointer, state, pointing, rotator, carrier))
                 status.flush()
             tick = max(tick + 1.0 / file.beam.rate_hz, now)
