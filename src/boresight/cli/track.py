@@ -7,7 +7,7 @@ import shlex
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,7 +16,7 @@ from cyclopts import Parameter
 
 from boresight._version import __version__
 from boresight.cli.output import print_json
-from boresight.config.tracker import parameters_of, read_tracker_config
+from boresight.config.tracker import parameters_of, read_configuration
 from boresight.errors import UserError
 from boresight.io.files import check_output, output_folder
 from boresight.io.recording import read_recording
@@ -71,12 +71,12 @@ def track(
     ids = sensor_ids(recording, sensors)
     source = config if config is not None else (rec / BESIDE if (rec / BESIDE).is_file() else None)
     known = [s.id for s in recording.sensors]
-    settings = TrackerConfig() if source is None else read_tracker_config(source, known)
+    settings, stages = (TrackerConfig(), {}) if source is None else read_configuration(source, known)
     if lag is not None:
         if not 0.0 <= lag <= LONGEST_LAG:
             raise UserError(f"--lag: {lag} s; give 0 to {LONGEST_LAG:g} s")
         settings = replace(settings, smoothing_lag=lag)
-    results = track_recording(recording, settings, ids)
+    results = track_recording(recording, settings, ids, stages, str(source))
     command = ["boresight", "track", str(rec), "-o", str(output)]
     command += ["--sensors", ",".join(ids)] if ids else []
     command += ["--config", str(config)] if config else []
@@ -112,16 +112,28 @@ def sensor_ids(recording: Recording, sensors: str | None) -> list[str] | None:
     return ids
 
 
-def track_recording(recording: Recording, config: TrackerConfig, sensors: list[str] | None = None) -> Results:
-    """Track a recording in memory, with a progress bar on standard error where that is a terminal."""
+def track_recording(
+    recording: Recording,
+    config: TrackerConfig,
+    sensors: list[str] | None = None,
+    stages: Mapping[str, Any] | None = None,
+    where: str = "",
+) -> Results:
+    """Track a recording in memory, with a progress bar on standard error where that is a terminal.
+
+    `stages` is the pipeline before the tracker, as `config.pipeline.take_pipeline` gives it (none); `where` its file.
+    """
     with loading():
+        from boresight import pipeline as stages_
+        from boresight.config.stages import make_pipeline
         from boresight.tracking.registration import Diary
-        from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
+        from boresight.tracking.run import decision_rows, track_rows, tracker_for
         from boresight.tracking.warm import warm
 
         warm(recording.dimensions)
     tracker = tracker_for(recording, config, sensors)
     scans = list(iter_scans(recording, sensors))
+    before = make_pipeline(stages or {}, recording, tracker.poses, tracker.used, where)
     started = time.perf_counter()
     with _progress(len(scans)) as tick:
         smoothed: list[Rows] = []
@@ -132,10 +144,12 @@ def track_recording(recording: Recording, config: TrackerConfig, sensors: list[s
             if tracker.plan.settings.n_constant:
                 diary.note(state)
 
-        state, rows, decisions = run(tracker, scans, progress=tick, watch=watch)
+        state, rows, decisions, notes = stages_.run(before, tracker, scans, progress=tick, watch=watch)
     seconds = time.perf_counter() - started
     tracks = track_rows(rows)
     fates = decision_rows(recording, tracker, decisions, state.names)
+    if before.stages:
+        fates = stages_.with_notes(fates, notes)
     summary: dict[str, Any] = {
         "version": __version__,
         "sensors": [recording.sensors[i].id for i in tracker.used],
@@ -150,7 +164,7 @@ def track_recording(recording: Recording, config: TrackerConfig, sensors: list[s
         "t_first_s": float(recording.detections.t.min()),
         "t_last_s": float(recording.detections.t.max()),
         "window_s": tracker.length,
-        "parameters": parameters_of(config),
+        "parameters": parameters_of(config) | ({"pipeline": pipeline_of(stages)} if stages else {}),
         "versions": versions(),
     }
     past = track_rows(smoothed) if config.smoothing_lag is not None else None
@@ -159,6 +173,11 @@ def track_recording(recording: Recording, config: TrackerConfig, sensors: list[s
     diary.note(state, last=True)
     summary["registration"] = [c._asdict() for c in diary.known[-1]]
     return Results(tracks, fates, summary, past, diary.rows())
+
+
+def pipeline_of(stages: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the pipeline as a summary shows it: kinds and options, and whether values share reports."""
+    return {**stages, "values_correlated": "smooth" in stages}
 
 
 def _fates(rows: DecisionRows) -> dict[str, int]:

@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from boresight.config.pipeline import take_pipeline
 from boresight.errors import UserError, did_you_mean
 from boresight.io.toml import TableModel, convert, read_toml
 from boresight.tracking.config import SensorErrors, TrackerConfig
@@ -115,7 +116,19 @@ class ConfigTable(TableModel, frozen=True):
 
 def read_tracker_config(path: Path, sensor_ids: list[str]) -> TrackerConfig:
     """Read a tracker configuration for a recording with these sensors; raises UserError with file and key."""
-    return tracker_config_of(read_toml(path), str(path), sensor_ids)
+    config, pipeline = read_configuration(path, sensor_ids)
+    if pipeline:
+        raise UserError(
+            f"{path}: has a [pipeline], which only `boresight track` and `boresight compare` apply; leave it out"
+        )
+    return config
+
+
+def read_configuration(path: Path, sensor_ids: list[str]) -> tuple[TrackerConfig, dict[str, Any]]:
+    """Read a configuration: the tracker's settings, and the pipeline before it as `take_pipeline` gives it."""
+    raw = read_toml(path)
+    pipeline = take_pipeline(raw, str(path))
+    return tracker_config_of(raw, str(path), sensor_ids), pipeline
 
 
 def tracker_config_of(data: dict[str, Any], path: str, sensor_ids: list[str]) -> TrackerConfig:

@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from boresight.frames.pose import pose_track
+from boresight.kernels.tracker import NOTHING
 from boresight.tracking.config import TrackerConfig
-from boresight.tracking.output import Rows
+from boresight.tracking.output import Rows, due_before
 from boresight.tracking.tracker import REASON, Decision, Output, Tracker, TrackerState, track_ids
 from boresight.types import (
     FATES,
@@ -16,6 +17,7 @@ from boresight.types import (
     STATUSES,
     DecisionRows,
     Fate,
+    FloatArray,
     Recording,
     Scan,
     TrackRows,
@@ -24,6 +26,7 @@ from boresight.types import (
 )
 
 NAVIGATION_GAP = 10.0  # s without navigation data over which a pose is still interpolated
+PROBABLE = 0.5  # least probability of being a target or a thing with which a track is believed
 NAVIGATION_AHEAD = 5.0  # s beyond the ends over which it is still extrapolated
 
 
@@ -68,6 +71,29 @@ def run(
         if watch is not None:
             watch(state, out)
     return state, rows, decisions
+
+
+def tick(tracker: Tracker, state: TrackerState, t_recv: float) -> Output:
+    """Give the rows due by `t_recv` (s) although no look comes in: a stage before the tracker may hold looks back."""
+    out = Output([], [], [])
+    if state.pending and t_recv > state.clock.arrival:
+        tracker._rows(state, out)
+        for t in due_before(state.clock, t_recv):
+            tracker._emit(state, out, t, t)
+    if t_recv > state.clock.arrival > -np.inf:
+        state.clock.arrival, state.pending = t_recv, True
+    return out
+
+
+def believed(tracker: Tracker, state: TrackerState) -> tuple[float, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return time (s), position, velocity (k, 3), covariance of each (k, 3, 3) of the probable tracks, world ENU."""
+    tr, d = state.window.tracks, tracker.dimensions
+    chosen = np.flatnonzero(tr.weight[: int(tr.live[0]), NOTHING] <= 1.0 - PROBABLE)
+    k = len(chosen)
+    p, v, P, V = np.zeros((k, 3)), np.zeros((k, 3)), np.zeros((k, 3, 3)), np.zeros((k, 3, 3))
+    p[:, :d], v[:, :d] = tr.x[chosen, :d], tr.x[chosen, d : 2 * d]
+    P[:, :d, :d], V[:, :d, :d] = tr.P[chosen, :d, :d], tr.P[chosen, d : 2 * d, d : 2 * d]
+    return float(tr.time[0]), p, v, P, V
 
 
 def track_rows(rows: Sequence[Rows]) -> TrackRows:

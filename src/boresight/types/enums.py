@@ -45,6 +45,8 @@ class Fate(StrEnum):
     OUT_OF_COVERAGE = "out_of_coverage"  # outside the coverage that the sensor declares
     NO_DETECTION = "no_detection"  # the row says that a look saw nothing
     NOT_SELECTED = "not_selected"  # its sensor was left out by --sensors
+    ALIGNED = "aligned"  # it went into a value with others, and counts there once
+    UNUSED = "unused"  # a pipeline stage had no use for it
 
 
 class Component(IntEnum):
