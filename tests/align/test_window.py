@@ -98,3 +98,10 @@ def test_mistakes_are_told() -> None:
         PolynomialWindow(1).weights([1.0, 2.0], [1.0, 0.0], 2.0)
     with pytest.raises(UserError, match="positive"):
         compress_innovations([1.0], [[1.0]], [0.0])
+
+
+@pytest.mark.parametrize("n", [2, 5, 10])
+def test_compression_varies_as_its_variance_says(n: int) -> None:
+    """1 % against Monte Carlo: 4e5 draws give 0.22 %."""
+    draws = compress(0.01 * np.random.default_rng(n).standard_normal((400_000, n)))
+    assert draws.var() == pytest.approx(compressed_variance(0.01, n), rel=0.01)

@@ -47,21 +47,16 @@ def three_cornered_hat(mean_square: ArrayLike, floor: ArrayLike) -> FloatArray:
     return out
 
 
-def residual_variance(values: ArrayLike, start: ArrayLike, rounds: int = 30) -> FloatArray:
-    """Return the mean square error (m,) of sources (n, m) from their residuals to the fused value, from `start` (m,).
+def residual_variance(residuals: ArrayLike, reference: ArrayLike, floor: ArrayLike) -> FloatArray:
+    """Return mean square errors (m,) of sources by `residuals` (n, m) to a fused prediction, at least `floor` (m,).
 
-    Against the value fused by weights w, source i's residual has the expectation σᵢ²(1 − 2wᵢ) + Σ wⱼ²σⱼ² for errors
-    without correlation: linear equations in σ², solved and weighted anew until they agree. No source is spoilt by a bad
-    one, for that has next to no weight; a constant bias counts. Never below a thousandth of `start`.
+    `reference` is the prediction's own variance, which is taken off: the prediction rests on reports before, so its
+    error and the new reports' are independent. One bad source does not spoil the others, and a constant bias counts.
+    Splits two good sources with far fewer samples than `three_cornered_hat`, which has only the bad one to do it by.
     """
-    a, v = np.asarray(values, dtype=np.float64), np.asarray(start, dtype=np.float64)
-    floor = 1e-3 * v
-    for _ in range(rounds):
-        w = inverse_variance(v)
-        square = ((a - (a @ w)[:, None]) ** 2).mean(axis=0)
-        A = np.diag(1.0 - 2.0 * w) + np.outer(np.ones(len(w)), w**2)
-        v = np.maximum(np.linalg.lstsq(A, square, rcond=None)[0], floor)
-    return v
+    r = np.asarray(residuals, dtype=np.float64)
+    out: FloatArray = np.maximum((r**2).mean(axis=0) - reference, np.asarray(floor, dtype=np.float64))
+    return out
 
 
 class ResidualVariance(NamedTuple):

@@ -74,4 +74,4 @@ def _over_time(axes: Axes, recording: Recording, results: Sequence[Results], nam
         axes.plot(scored.clock - scored.clock[0], scored.gospa[:, 0], label=name, linewidth=1.1)
     axes.set_xlabel("time (s)")
     axes.set_ylabel("GOSPA (m)")
-    axes.legend(ncols=4, fontsize=8, loc="upper right")
+    axes.legend(ncols=6, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)

@@ -17,6 +17,7 @@ from boresight.kernels.stream import ekf_stream
 from boresight.kernels.unscented import ukf_stream
 from boresight.models import Infrared, Radar
 from boresight.papers.montecarlo import Estimates, nees, wrapped
+from boresight.papers.shao2012.alignment import aligned
 from boresight.papers.shao2012.scenario import Data, IndexArray, MaskArray, Setup, own_ship, pose
 from boresight.types.sensor import FloatArray
 
@@ -140,5 +141,8 @@ METHODS: dict[str, Callable[[Setup, Data], Estimates]] = {
     "ukf": lambda s, d: cartesian(s, d, "ukf"),
     "radar_only": lambda s, d: cartesian(s, d, only=d.is_radar),
     "ir_only": lambda s, d: cartesian(s, d, only=~d.is_radar),
+    "interpolate": lambda s, d: aligned(s, d, "interpolate"),
+    "compress": lambda s, d: aligned(s, d, "compress"),
+    "compressed_innovations": lambda s, d: aligned(s, d, "innovations"),
     "rts": lambda s, d: cartesian(s, d, smooth=True),
 }
