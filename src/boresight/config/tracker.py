@@ -119,7 +119,7 @@ def read_tracker_config(path: Path, sensor_ids: list[str]) -> TrackerConfig:
     config, pipeline = read_configuration(path, sensor_ids)
     if pipeline:
         raise UserError(
-            f"{path}: has a [pipeline], which only `boresight track` and `boresight compare` apply; leave it out"
+            f"{path}: [pipeline] is applied by `boresight track` and `compare` only; leave it out here"
         )
     return config
 
