@@ -2,7 +2,7 @@
 
 Every contender's result is checked against ours before anything is timed; contenders take turns; the figure is the
 median of the rounds, in CPU time. `ratio` is the contender's figure over ours (above 1: we are faster). Without --quick
-the table is also written to benchmarks/results.json.
+the rows are also written to benchmarks/results.json and the table of docs/speed.md.
 """
 
 from __future__ import annotations
@@ -10,74 +10,59 @@ from __future__ import annotations
 import argparse
 import json
 import platform
-import statistics
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from benchmarks import assignment, filters, scoreboard, whole_tracker
+from benchmarks import assignment, batch, filters, scoreboard, startup, table, whole_tracker
+from benchmarks.timing import Contenders, Row, row, rows_of
 from boresight._version import __version__
-
-Contenders = dict[str, tuple[Callable[[], Any], int]]  # name -> (call, how many units of work one call does)
-
-
-def timed(contenders: Contenders, rounds: int) -> dict[str, float]:
-    """Return the median CPU time per unit of work (s), contenders taking turns."""
-    spent: dict[str, list[float]] = {name: [] for name in contenders}
-    for _ in range(rounds):
-        for name, (call, units) in contenders.items():
-            started = time.process_time()
-            call()
-            spent[name].append((time.process_time() - started) / units)
-    return {name: statistics.median(values) for name, values in spent.items()}
+from boresight.study.engine import cores
 
 
-def rows_of(work: str, contenders: Contenders, rounds: int, unit: str, scale: float) -> list[dict[str, Any]]:
-    """Time contenders, the first of which is ours, and return one row each."""
-    found = timed(contenders, rounds)
-    ours = next(iter(found.values()))
-    return [
-        {"work": work, "contender": name, "value": value * scale, "unit": unit, "ratio": value / ours}
-        for name, value in found.items()
-    ]
-
-
-def filter_rows(quick: bool) -> list[dict[str, Any]]:
-    """One report per call, and the whole stream in one call."""
+def filter_rows(quick: bool) -> list[Row]:
+    """One report per call, and the whole stream in one call; user's own models beside the built-in ones."""
     peers = {"NumPy by hand": filters.by_hand, "FilterPy": filters.filterpy, "Stone Soup": filters.stone_soup}
-    reports = filters.rows(200)
-    reference = filters.friendly(reports)
-    for name, peer in peers.items():
+    size = 100 if quick else 500
+    part = filters.rows(size)
+    reference = filters.friendly(part)
+    calls = filters.packed_calls(part)
+    own_calls, _ = filters.own_models(part)
+    for name, peer in {**peers, "packed": lambda _: calls(), "own models": lambda _: own_calls()}.items():
         # Stone Soup differentiates h numerically; the others agree to rounding
         tolerance = 1e-3 if name == "Stone Soup" else 1e-6
-        np.testing.assert_allclose(peer(reports), reference, rtol=0, atol=tolerance, err_msg=name)
-    many = filters.rows(20_000)
-    whole = filters.prepared(many)
-    np.testing.assert_allclose(whole(), filters.friendly(many), rtol=0, atol=1e-6)
-    size = 200 if quick else 1000
-    part = filters.rows(size)
-    contenders: Contenders = {"boresight": (lambda: filters.friendly(part), size)}
+        np.testing.assert_allclose(peer(part), reference, rtol=0, atol=tolerance, err_msg=name)
+    contenders: Contenders = {
+        "boresight, packed": (lambda: [calls() for _ in range(20)], 20 * size),
+        "boresight, packed, own models": (lambda: [own_calls() for _ in range(20)], 20 * size),
+        "boresight": (lambda: filters.friendly(part), size),
+    }
     contenders |= {name: (lambda p=peer: p(part), size) for name, peer in peers.items()}
-    one = rows_of("one report per call", contenders, 3 if quick else 7, "us per report", 1e6)
-    streams: Contenders = {"boresight": (whole, len(many))}
-    for name, call in filters.other_streams(many).items():
+    one = rows_of("one report per call", contenders, 5 if quick else 9, "us per report", 1e6)
+    many = filters.rows(20_000)
+    whole, general = filters.packed_stream(many), filters.prepared(many)
+    _, own_whole = filters.own_models(many)
+    for name, call in {"general": general, "own models": own_whole}.items():
+        np.testing.assert_allclose(call(), whole(), rtol=0, atol=1e-6, err_msg=name)
+    streams: Contenders = {
+        "boresight": (lambda: [whole() for _ in range(10)], 10 * len(many)),
+        "boresight, own models": (lambda: [own_whole() for _ in range(3)], 3 * len(many)),
+        "boresight, all states kept": (general, len(many)),
+    }
+    few = many[:2000]
+    for name, call in filters.other_streams(few).items():
         call()
-        streams[name] = (call, len(many))
-    stream = rows_of("whole stream in one call", streams, 5, "us per report", 1e6)
+        streams[name] = (call, len(few))
+    stream = rows_of("whole stream in one call", streams, 5 if quick else 9, "us per report", 1e6)
     slow = {r["contender"]: r["value"] for r in one}
-    for name in ("NumPy by hand", "FilterPy", "Stone Soup"):
-        ratio = slow[name] / stream[0]["value"]
-        stream.append(
-            {"work": stream[0]["work"], "contender": name, "value": slow[name], "unit": "us per report", "ratio": ratio}
-        )
+    stream += [
+        row(stream[0]["work"], name, slow[name], "us per report", slow[name] / stream[0]["value"]) for name in peers
+    ]
     return one + stream
 
 
-def assignment_rows(quick: bool) -> list[dict[str, Any]]:
+def assignment_rows(quick: bool) -> list[Row]:
     """Gate and assignment at growing size: equal cost, then time."""
     out, ours = [], {}
     for targets in (100, 1000, 5000):
@@ -95,16 +80,16 @@ def assignment_rows(quick: bool) -> list[dict[str, Any]]:
         ours[targets] = next(r["value"] for r in out if r["work"].endswith(f" {targets} targets"))
     growth = float(np.log(ours[5000] / ours[100]) / np.log(50.0))
     work = "gate and assignment, growth exponent 100 to 5,000"
-    return [*out, {"work": work, "contender": "boresight", "value": growth, "unit": "exponent", "ratio": 1.0}]
+    return [*out, row(work, "boresight", growth, "exponent")]
 
 
-def tracker_rows(quick: bool) -> list[dict[str, Any]]:
+def tracker_rows(quick: bool) -> list[Row]:
     """The whole tracker on a large scenario, and on the real recordings where they are."""
     out = []
     for targets, seconds in ((400, 60.0),) if quick else ((400, 120.0), (4000, 300.0)):
         value = whole_tracker.measure(targets, seconds)["times_real_time"]
         work = f"whole tracker, {targets} targets, {targets // 2} reports/s"
-        out.append({"work": work, "contender": "boresight", "value": value, "unit": "times real time", "ratio": 1.0})
+        out.append(row(work, "boresight", value, "times real time"))
     if scoreboard.DATA.is_dir():
         data = {n: r for n, r in scoreboard.recordings(scoreboard.DATA).items() if n == 2}
         config = scoreboard.configuration(data[2])
@@ -116,11 +101,22 @@ def tracker_rows(quick: bool) -> list[dict[str, Any]]:
     return out
 
 
+def machine() -> str:
+    """Return the processor's name and how many cores may be used."""
+    names = [line.split(":", 1)[1].strip() for line in _cpu_lines() if line.startswith("model name")]
+    return f"{names[0] if names else platform.processor() or platform.machine()}, {cores()} cores"
+
+
+def _cpu_lines() -> list[str]:
+    path = Path("/proc/cpuinfo")
+    return path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
+
+
 def versions() -> dict[str, str]:
     """Return the machine and the versions of everything that was measured."""
     from importlib.metadata import PackageNotFoundError, version
 
-    out = {"boresight": __version__, "python": platform.python_version(), "machine": platform.machine()}
+    out = {"boresight": __version__, "python": platform.python_version(), "machine": machine()}
     for name in ("numpy", "scipy", "numba", "filterpy", "stonesoup"):
         try:
             out[name] = version(name)
@@ -140,11 +136,13 @@ def main() -> int:
     except ImportError as error:
         print(f"benchmarks: {error.name} is not installed; run make bench, or install the extra bench", file=sys.stderr)
         return 2
-    rows = filter_rows(arguments.quick) + assignment_rows(arguments.quick) + tracker_rows(arguments.quick)
+    quick = arguments.quick
+    rows = filter_rows(quick) + batch.rows(quick) + assignment_rows(quick) + tracker_rows(quick) + startup.rows(quick)
     result = {"command": "benchmarks", "version": __version__, "parameters": versions(), "rows": rows}
     if not arguments.quick:
         path = Path(__file__).with_name("results.json")
         path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+        table.write(result)
     if arguments.json:
         print(json.dumps(result, indent=1))
         return 0

@@ -9,12 +9,14 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numba import njit
 
 import boresight
-from boresight.filters import ekf, stream
+from boresight.filters import ekf, own, packed, stream
 from boresight.filters.msc import MscFilter
 from boresight.filters.ukf import UnscentedKalman
 from boresight.models import Infrared, NearlyConstantVelocity, Radar
+from boresight.models.own import OwnMotion, OwnSensor
 
 Rows = list[tuple[float, Any, np.ndarray]]
 X0 = np.array([4000.0, 3000.0, 1000.0, -100.0, 20.0, 0.0])
@@ -46,6 +48,94 @@ def friendly(reports: Rows) -> np.ndarray:
     for t, sensor, z in reports:
         state, _ = boresight.update(boresight.predict(state, MOTION, t), sensor, z)
     return state.x
+
+
+def packed_calls(reports: Rows) -> Callable[[], np.ndarray]:
+    """One call a report on a packed belief, in place; laying the reports out is not part of it."""
+    start, filled = packed.pack(ekf.init(0.0, X0, P0), MOTION), [packed.report(s, t, z) for t, s, z in reports]
+    belief = start.copy()
+
+    def call() -> np.ndarray:
+        belief[:] = start
+        for report in filled:
+            packed.step(belief, report)
+        return packed.unpack(belief).x
+
+    return call
+
+
+def packed_stream(reports: Rows) -> Callable[[], np.ndarray]:
+    """The whole stream in one call on a packed belief."""
+    start, table = packed.pack(ekf.init(0.0, X0, P0), MOTION), packed.table(*map(list, zip(*reports, strict=True)))
+    belief = start.copy()
+
+    def call() -> np.ndarray:
+        belief[:] = start
+        packed.run(belief, table)
+        return packed.unpack(belief).x
+
+    return call
+
+
+@njit(cache=True)
+def own_move(x, dt, p, x_out, F, Q):
+    """A user's nearly constant velocity: p = (q,)."""
+    F[:, :] = 0.0
+    Q[:, :] = 0.0
+    for i in range(3):
+        F[i, i] = F[3 + i, 3 + i] = 1.0
+        F[i, 3 + i] = dt
+        Q[i, i], Q[3 + i, 3 + i] = p[0] * dt * dt * dt / 3.0, p[0] * dt
+        Q[i, 3 + i] = Q[3 + i, i] = p[0] * dt * dt / 2.0
+        x_out[i], x_out[3 + i] = x[i] + dt * x[3 + i], x[3 + i]
+
+
+@njit(cache=True)
+def own_see(x, z, c, y, H, R):
+    """A user's range, azimuth and elevation at the origin: c = variances; range may be missing."""
+    flat2 = x[0] * x[0] + x[1] * x[1]
+    flat, r2 = math.sqrt(flat2), flat2 + x[2] * x[2]
+    r = math.sqrt(r2)
+    H[:3, :] = 0.0
+    R[:3, :3] = 0.0
+    m = 0
+    if not math.isnan(z[0]):
+        y[0], R[0, 0] = z[0] - r, c[0]
+        H[0, 0], H[0, 1], H[0, 2] = x[0] / r, x[1] / r, x[2] / r
+        m = 1
+    y[m] = (z[1] - math.atan2(x[0], x[1]) + math.pi) % (2.0 * math.pi) - math.pi
+    H[m, 0], H[m, 1] = x[1] / flat2, -x[0] / flat2
+    y[m + 1] = z[2] - math.atan2(x[2], flat)
+    H[m + 1, 0], H[m + 1, 1] = -x[0] * x[2] / (flat * r2), -x[1] * x[2] / (flat * r2)
+    H[m + 1, 2] = flat / r2
+    R[m, m], R[m + 1, m + 1] = c[1], c[2]
+    return m + 2
+
+
+def own_models(reports: Rows) -> tuple[Callable[[], np.ndarray], Callable[[], np.ndarray]]:
+    """A user's own kernels: one call a report, and the whole stream."""
+    motion = OwnMotion(own_move, 6, np.array([MOTION.q]))
+    sensors = {
+        3: OwnSensor(own_see, 3, np.array([25.0, 1e-4, 1e-4])),
+        2: OwnSensor(own_see, 3, np.array([1.0, 4e-6, 4e-6])),
+    }
+    full = [(t, sensors[s.dimension], z if s.dimension == 3 else np.r_[np.nan, z]) for t, s, z in reports]
+    used, start = own.models(motion, sensors[3]), own.pack(ekf.init(0.0, X0, P0), motion)
+    filled, table = [own.report(s, t, z) for t, s, z in full], own.table(*map(list, zip(*full, strict=True)))
+    belief = start.copy()
+
+    def calls() -> np.ndarray:
+        belief[:] = start
+        for report in filled:
+            own.step(belief, report, used.motion, used.observe)
+        return own.unpack(belief).x
+
+    def whole() -> np.ndarray:
+        belief[:] = start
+        own.run(belief, used, table)
+        return own.unpack(belief).x
+
+    return calls, whole
 
 
 def prepared(reports: Rows) -> Callable[[], np.ndarray]:

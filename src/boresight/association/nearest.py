@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boresight.errors import UserError
-from boresight.kernels.assignment import assign_sparse
-from boresight.kernels.gate import gate_grid
+from boresight.kernels.gate import NOT_FINITE, assign_frame
 from boresight.types.sensor import FloatArray
 
 
@@ -32,42 +31,6 @@ class Assignment(NamedTuple):
     pairs: Pairs
 
 
-def candidates(
-    x: FloatArray,
-    S: FloatArray,
-    z: FloatArray,
-    *,
-    gate: float,
-    p_detection: float = 0.9,
-    clutter_density: float,
-) -> Pairs:
-    """Return the pairs of predicted measurements `x` (n, d) and detections `z` (m, d) inside the gate.
-
-    S (n, d, d) is each innovation's covariance, `gate` the largest d², `clutter_density` the mean number of false
-    detections per unit of measurement space. A pair costs ½(d² + ln|2πS|) - ln(p_D / ((1 - p_D) λ)) (Blackman and
-    Popoli 1999, 6.2); a pair that costs more than staying apart is left out. Components are Cartesian, two or more
-    (angles that wrap must be unwrapped about the predictions). Raises UserError.
-    """
-    x, S, z = (np.require(a, dtype=float, requirements=("C", "W")) for a in (x, S, z))
-    n, d = x.shape if x.ndim == 2 else (0, 0)
-    if d < 2 or S.shape != (n, d, d) or z.shape[1:] != (d,):
-        raise UserError("give predictions (n, d), covariances (n, d, d) and detections (m, d) with d of 2 or more")
-    if not (gate > 0.0 and 0.0 < p_detection < 1.0 and clutter_density > 0.0):
-        raise UserError("gate and clutter_density must be positive, p_detection between 0 and 1")
-    if not np.isfinite(x).all() or not np.isfinite(z).all():
-        raise UserError("predictions and detections must be finite")
-    gain = math.log(p_detection / (1.0 - p_detection) / clutter_density) - 0.5 * d * math.log(2.0 * math.pi)
-    start, room = np.empty(n + 1, dtype=np.int64), 4 * n + 64
-    while True:
-        detection, cost, d2 = np.empty(room, dtype=np.int64), np.empty(room), np.empty(room)
-        found = gate_grid(x, S, z, gate, gain, start, detection, cost, d2)
-        if found < 0:
-            raise UserError(f"the covariance of track {-1 - found} is not positive definite")
-        if found <= room:
-            return Pairs(start, detection[:found], cost[:found], d2[:found])
-        room = found
-
-
 def assign(
     x: FloatArray,
     S: FloatArray,
@@ -77,15 +40,30 @@ def assign(
     p_detection: float = 0.9,
     clutter_density: float,
 ) -> Assignment:
-    """Assign detections to tracks at the least total cost; arguments as `candidates`.
+    """Assign detections `z` (m, d) to tracks with predicted measurements `x` (n, d) at the least total cost.
 
-    The optimum of the dense problem in which every pair outside the gate is forbidden and every track may stay alone at
-    cost zero. Raises UserError.
+    S (n, d, d) is each innovation's covariance, `gate` the largest squared Mahalanobis distance d², `clutter_density`
+    the mean number of false detections per unit of measurement space. A pair costs ½(d² + ln|2πS|) - ln(p_D / ((1 -
+    p_D) λ)) (Blackman and Popoli 1999, 6.2), a track alone nothing. It is the optimum of the dense problem in which
+    every pair outside the gate is forbidden. Components are Cartesian, two or more (angles that wrap must be unwrapped
+    about the predictions). Raises UserError.
     """
-    pairs = candidates(x, S, z, gate=gate, p_detection=p_detection, clutter_density=clutter_density)
-    detection = np.empty(len(x), dtype=np.int64)
-    assign_sparse(pairs.start, pairs.detection, pairs.cost, len(z), detection)
-    chosen = pairs.detection == np.repeat(detection, np.diff(pairs.start))
-    d2 = np.full(len(x), np.nan)
-    d2[detection >= 0] = pairs.d2[chosen]
-    return Assignment(detection, d2, float(pairs.cost[chosen].sum()), pairs)
+    x, S, z = (np.require(a, dtype=float, requirements=("C", "W")) for a in (x, S, z))
+    n, d = x.shape if x.ndim == 2 else (0, 0)
+    if d < 2 or S.shape != (n, d, d) or z.shape[1:] != (d,):
+        raise UserError("give predictions (n, d), covariances (n, d, d) and detections (m, d) with d of 2 or more")
+    if not (gate > 0.0 and 0.0 < p_detection < 1.0 and clutter_density > 0.0):
+        raise UserError("gate and clutter_density must be positive, p_detection between 0 and 1")
+    gain = math.log(p_detection / (1.0 - p_detection) / clutter_density) - 0.5 * d * math.log(2.0 * math.pi)
+    start, chosen, d2_chosen = np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(n)
+    room = 4 * n + 64
+    while True:
+        detection, cost, d2 = np.empty(room, dtype=np.int64), np.empty(room), np.empty(room)
+        found, total = assign_frame(x, S, z, gate, gain, start, detection, cost, d2, chosen, d2_chosen)
+        if found == NOT_FINITE:
+            raise UserError("predictions and detections must be finite")
+        if found < 0:
+            raise UserError(f"the covariance of track {-1 - found} is not positive definite")
+        if found <= room:
+            return Assignment(chosen, d2_chosen, total, Pairs(start, detection[:found], cost[:found], d2[:found]))
+        room = found

@@ -183,12 +183,8 @@ def run_many(
     if any(np.shape(row) != (n, s.dimension) for s, row in zip(sensors, z)):
         raise UserError(f"measurements must be (N, m) with N = {n} tracks and m the components of the report's sensor")
     contexts, which = schedule(sensors)
-    m = -(-n // width)
-    b = _numbers(np.asarray(x0, dtype=float), np.broadcast_to(P0, (n, 6, 6)))
-    blocks = _in_tiles(b, m).reshape(m, -1)
-    measured = np.full((m, k, max(s.dimension for s in sensors) * width), np.nan)
-    for i, row in enumerate(z):
-        measured[:, i, : row.shape[1] * width] = _in_tiles(np.asarray(row, dtype=float), m).reshape(m, -1)
+    blocks, measured = layout(x0, P0, z)
+    m = len(blocks)
     score = np.empty((m, 2 * width))
     kept = np.empty((m, k, 27 * width)) if keep else NO_TILES
     times = np.ascontiguousarray(t, dtype=float)
@@ -204,6 +200,17 @@ def run_many(
     sums = score.reshape(m, 2, width).transpose(1, 0, 2).reshape(2, -1)[:, :n]
     path = kept.reshape(m, k, 27, width)[:, :, :6].transpose(1, 0, 3, 2).reshape(k, -1, 6)[:, :n] if keep else NO_TILES
     return BatchResult(x, P, sums[0], sums[1], path)
+
+
+def layout(x0: FloatArray, P0: FloatArray, z: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return the beliefs (m, 27·WIDTH) and measurements (m, k, c·WIDTH) of N tracks as `kernels.tiles` has them."""
+    n, width = len(x0), tiles.WIDTH
+    m = -(-n // width)
+    b = _numbers(np.asarray(x0, dtype=float), np.broadcast_to(P0, (n, 6, 6)))
+    measured = np.full((m, len(z), max(row.shape[1] for row in z) * width), np.nan)
+    for i, row in enumerate(z):
+        measured[:, i, : row.shape[1] * width] = _in_tiles(np.asarray(row, dtype=float), m).reshape(m, -1)
+    return _in_tiles(b, m).reshape(m, -1), measured
 
 
 def _in_tiles(rows: FloatArray, m: int) -> FloatArray:

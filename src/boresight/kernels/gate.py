@@ -1,6 +1,6 @@
 """Which detections lie in which track's gate: a grid of cells over the detections, exact distances inside."""
 
-# Numba caches by file and compiles kernels.gaussian into these: clear __pycache__ (make clean) when that changes.
+# Numba caches by file and compiles kernels.gaussian and assignment into these: clear __pycache__ when those change.
 from __future__ import annotations
 
 import math
@@ -8,12 +8,14 @@ import math
 import numpy as np
 from numba import njit, types
 
+from boresight.kernels.assignment import assign_sparse
 from boresight.kernels.gaussian import cholesky
 from boresight.kernels.observation import IntArray
 from boresight.kernels.signatures import MATRIX, STACK, VECTOR
 from boresight.types.sensor import FloatArray
 
 INTS = types.int64[::1]
+NOT_FINITE = -(2**62)  # what `gate_grid` returns where a prediction or detection is NaN or infinite
 
 
 @njit(cache=True)
@@ -76,9 +78,15 @@ def gate_grid(
     reach = math.sqrt(gate)
     low, high, half = np.full(2, np.inf), np.full(2, -np.inf), 0.0
     for j in range(m):
+        for a in range(d):
+            if not math.isfinite(z[j, a]):
+                return NOT_FINITE
         for a in range(2):
             low[a], high[a] = min(low[a], z[j, a]), max(high[a], z[j, a])
     for i in range(n):
+        for a in range(d):
+            if not math.isfinite(x[i, a]):
+                return NOT_FINITE
         half += reach * math.sqrt(max(S[i, 0, 0], S[i, 1, 1])) / n
     span = max(high[0] - low[0], high[1] - low[1], 1e-300) if m else 1.0
     size = max(half, span / math.sqrt(m + 1.0))  # about one detection a cell where they are spread evenly
@@ -108,3 +116,40 @@ def gate_grid(
                     found += 1
     start[n] = min(found, len(column))
     return found
+
+
+@njit(
+    types.Tuple((types.int64, types.float64))(  # type: ignore[no-untyped-call]
+        MATRIX, STACK, MATRIX, types.float64, types.float64, INTS, INTS, VECTOR, VECTOR, INTS, VECTOR
+    ),
+    cache=True,
+)  # fmt: skip
+def assign_frame(
+    x: FloatArray,
+    S: FloatArray,
+    z: FloatArray,
+    gate: float,
+    gain: float,
+    start: IntArray,
+    column: IntArray,
+    cost: FloatArray,
+    d2: FloatArray,
+    chosen: IntArray,
+    d2_chosen: FloatArray,
+) -> tuple[int, float]:
+    """`gate_grid`, then the least total cost: fills `chosen` (n,), -1 for none, and its d² (n,), NaN for none.
+
+    Returns what `gate_grid` does and the total cost; where the pairs did not fit, nothing is assigned.
+    """
+    found = gate_grid(x, S, z, gate, gain, start, column, cost, d2)
+    total = 0.0
+    if found < 0 or found > len(column):
+        return found, total
+    assign_sparse(start, column[:found], cost[:found], z.shape[0], chosen)
+    for i in range(x.shape[0]):
+        d2_chosen[i] = np.nan
+        for e in range(start[i], start[i + 1]):
+            if column[e] == chosen[i]:
+                total += cost[e]
+                d2_chosen[i] = d2[e]
+    return found, total

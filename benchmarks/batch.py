@@ -1,0 +1,105 @@
+"""Monte Carlo: many tracks that share a schedule. Our tiles, and NumPy over all tracks at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.filters import MOTION, P0, SENSORS, X0
+from benchmarks.timing import FUSED_TIMES, Contenders, Row, peak, row, timed
+from boresight.filters import packed
+from boresight.kernels import tiles
+
+# Operations of the straight-line algebra, an update and the prediction before it: radar (3 components), infrared (2)
+FLOPS = {3: 415, 2: 309}
+
+
+class Study(NamedTuple):
+    """N tracks, k reports, radar and infrared in turn (or one of them alone)."""
+
+    t: np.ndarray  # (k,)
+    sensors: list
+    x0: np.ndarray  # (N, 6)
+    z: list[np.ndarray]  # (N, m) each
+
+
+def study(tracks: int, reports: int, sensors: tuple = SENSORS) -> Study:
+    """Return a study of one straight path."""
+    rng = np.random.default_rng(8)
+    t, used, z = 0.02 * np.arange(1, reports + 1), [sensors[k % len(sensors)] for k in range(reports)], []
+    for now, sensor in zip(t, used, strict=True):
+        truth = X0.copy()
+        truth[:3] += now * X0[3:]
+        noise = rng.normal(size=(tracks, sensor.dimension)) * np.sqrt(np.diag(sensor.R(truth)))
+        z.append(sensor.h(truth) + noise)
+    return Study(t, used, X0 + rng.normal(size=(tracks, 6)) * np.sqrt(np.diag(P0)), z)
+
+
+def ours(s: Study) -> np.ndarray:
+    """The public function, layout and all: final means (N, 6)."""
+    return packed.run_many(MOTION, 0.0, s.x0, P0, s.t, s.sensors, s.z, threads=1).x
+
+
+def kernel(s: Study) -> Callable[[], None]:
+    """The kernel alone, on data that is laid out."""
+    contexts, which = packed.schedule(s.sensors)
+    blocks, measured = packed.layout(s.x0, P0, s.z)
+    score, kept = np.empty((len(blocks), 2 * tiles.WIDTH)), np.empty((0, 0, 0))
+
+    def call() -> None:
+        tiles.run_tiles(blocks.copy(), 0.0, MOTION.q, s.t, measured, contexts, which, score, kept)
+
+    return call
+
+
+def numpy_batched(s: Study) -> np.ndarray:
+    """Arrays over all tracks, dense matrices, the updates of `filters.by_hand`."""
+    n = len(s.x0)
+    x, P, now, eye = s.x0.copy(), np.broadcast_to(P0, (n, 6, 6)).copy(), 0.0, np.eye(6)
+    for t, sensor, z in zip(s.t, s.sensors, s.z, strict=True):
+        F, Q = MOTION.F(X0, t - now), MOTION.Q(X0, t - now)
+        x, P, now = x @ F.T, F @ P @ F.T + Q, t
+        e, north, u = x[:, 0], x[:, 1], x[:, 2]
+        rho2 = e * e + north * north
+        rho, r2 = np.sqrt(rho2), rho2 + u * u
+        r = np.sqrt(r2)
+        H = np.zeros((n, 3, 6))
+        H[:, 0, :3] = np.stack((e, north, u), axis=1) / r[:, None]
+        H[:, 1, 0], H[:, 1, 1] = north / rho2, -e / rho2
+        H[:, 2, 0], H[:, 2, 1], H[:, 2, 2] = -e * u / (rho * r2), -north * u / (rho * r2), rho / r2
+        h = np.stack((r, np.arctan2(e, north), np.arctan2(u, rho)), axis=1)
+        if sensor.dimension == 2:
+            H, h = H[:, 1:], h[:, 1:]
+        y = z - h
+        y[:, -2:] = (y[:, -2:] + np.pi) % (2 * np.pi) - np.pi
+        HP = H @ P
+        K = np.linalg.solve(HP @ H.transpose(0, 2, 1) + sensor.R(X0), HP).transpose(0, 2, 1)
+        x = x + (K @ y[..., None])[..., 0]
+        A = eye - K @ H
+        P = A @ P @ A.transpose(0, 2, 1) + K @ sensor.R(X0) @ K.transpose(0, 2, 1)
+    return x
+
+
+def rows(quick: bool) -> list[Row]:
+    """Agreement, then time per update and core, and the share of the measured peak."""
+    small = study(64, 40)
+    np.testing.assert_allclose(ours(small), numpy_batched(small), rtol=0, atol=1e-6)
+    big = study(1024, 200)
+    contenders: Contenders = {
+        "boresight": (kernel(big), 1024 * 200),
+        "boresight, with layout": (lambda: ours(big), 1024 * 200),
+        "NumPy batched": (lambda: numpy_batched(study_part), 1024 * 20),
+        "peak": (peak, 2 * 128 * FUSED_TIMES),
+    }
+    study_part = study(1024, 20)
+    for call, _ in contenders.values():
+        call()
+    found = timed(contenders, 5 if quick else 15)
+    work, speed = "Monte Carlo, radar and IR EKF", found.pop("peak")
+    out = [row(work, name, 1e9 * v, "ns per update", v / found["boresight"]) for name, v in found.items()]
+    out.append(row("the core's peak", "fused multiply-add loop", 1e-9 / speed, "GFLOP/s"))
+    share = 0.5 * (FLOPS[3] + FLOPS[2]) * speed / found["boresight"]
+    out.append(row("Monte Carlo, share of the core's peak", "boresight", share, "fraction"))
+    return out
