@@ -9,8 +9,12 @@ import numpy as np
 
 from benchmarks.filters import MOTION, P0, SENSORS, X0
 from benchmarks.timing import FUSED_TIMES, Contenders, Row, peak, row, timed
-from boresight.filters import packed
-from boresight.kernels import tiles
+from boresight.filters import ekf, packed, stream
+from boresight.filters.imm import InteractingModels
+from boresight.filters.many import run_many_imm, run_many_ukf
+from boresight.filters.ukf import UnscentedKalman
+from boresight.kernels import imm_tiles, tiles, ukf_tiles
+from boresight.models import NearlyConstantVelocity
 
 # Operations of the straight-line algebra, an update and the prediction before it: radar (3 components), infrared (2)
 FLOPS = {3: 415, 2: 309}
@@ -54,6 +58,41 @@ def kernel(s: Study) -> Callable[[], None]:
     return call
 
 
+MODELS = InteractingModels((MOTION, NearlyConstantVelocity(q=20.0)), (10.0, 5.0))
+UKF = UnscentedKalman()
+
+
+def imm_kernel(s: Study) -> Callable[[], None]:
+    """Two interacting models, laid out."""
+    contexts, which = packed.schedule(s.sensors)
+    first, measured = packed.layout(s.x0, P0, s.z)
+    blocks = np.concatenate((first, first, np.full((len(first), tiles.WIDTH), 0.5)), axis=1)
+    q, chain = np.array([0.5, 20.0]), imm_tiles.transitions_of(np.array([10.0, 5.0]), np.diff(s.t, prepend=0.0))
+    score = np.empty((len(blocks), 2 * tiles.WIDTH))
+    return lambda: imm_tiles.run_imm_tiles(blocks.copy(), 0.0, q, chain, s.t, measured, contexts, which, score)
+
+
+def ukf_kernel(s: Study) -> Callable[[], None]:
+    """The unscented filter, laid out."""
+    contexts, which = packed.schedule(s.sensors)
+    full = [z if z.shape[1] == 3 else np.insert(z, 0, 0.0, axis=1) for z in s.z]
+    blocks, measured = packed.layout(s.x0, P0, full)
+    score = np.empty((len(blocks), 2 * tiles.WIDTH))
+    return lambda: ukf_tiles.run_ukf_tiles(
+        blocks.copy(), 0.0, MOTION.q, UKF.scaling, s.t, measured, contexts, which, score
+    )
+
+
+def agree(s: Study) -> None:
+    """Hold the tiles of the other filters against the streams of their filters, for one track."""
+    start, reports = ekf.init(0.0, s.x0[0], P0), stream.stack(s.t, s.sensors, [z[0] for z in s.z])
+    one = MODELS.run(MODELS.init(0.0, s.x0[0], P0, [0.0, 0.0]), reports)
+    many = run_many_imm(MODELS, 0.0, s.x0, P0, s.t, s.sensors, s.z, threads=1)
+    np.testing.assert_allclose(many.x[0], one.x[-1], rtol=0, atol=1e-6)
+    whole = run_many_ukf(UKF, MOTION, 0.0, s.x0, P0, s.t, s.sensors, s.z, threads=1)
+    np.testing.assert_allclose(whole.x[0], UKF.run(start, MOTION, reports).x[-1], rtol=0, atol=1e-6)
+
+
 def numpy_batched(s: Study) -> np.ndarray:
     """Arrays over all tracks, dense matrices, the updates of `filters.by_hand`."""
     n = len(s.x0)
@@ -86,10 +125,13 @@ def rows(quick: bool) -> list[Row]:
     """Agreement, then time per update and core, and the share of the measured peak."""
     small = study(64, 40)
     np.testing.assert_allclose(ours(small), numpy_batched(small), rtol=0, atol=1e-6)
+    agree(small)
     big = study(1024, 200)
     contenders: Contenders = {
         "boresight": (kernel(big), 1024 * 200),
         "boresight, with layout": (lambda: ours(big), 1024 * 200),
+        "boresight, IMM of two models": (imm_kernel(big), 1024 * 200),
+        "boresight, UKF": (ukf_kernel(big), 1024 * 200),
         "NumPy batched": (lambda: numpy_batched(study_part), 1024 * 20),
         "peak": (peak, 2 * 128 * FUSED_TIMES),
     }

@@ -82,7 +82,7 @@ def pack(state: GaussianState, motion: NearlyConstantVelocity) -> FloatArray:
 
 def unpack(belief: FloatArray) -> GaussianState:
     """Return the state that a packed belief (29,) holds."""
-    x, P = _dense(belief[None, NUMBERS:])
+    x, P = dense(belief[None, NUMBERS:])
     return GaussianState(float(belief[TIME]), x[0], P[0])
 
 
@@ -92,7 +92,7 @@ def _numbers(x: FloatArray, P: FloatArray) -> FloatArray:
     return np.concatenate((x, *upper), axis=1)
 
 
-def _dense(numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
+def dense(numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return means (N, 6) and covariances (N, 6, 6) of (N, 27) numbers."""
     P = np.empty((len(numbers), 6, 6))
     i, j = _HALF
@@ -175,13 +175,8 @@ def run_many(
     kept. Raises UserError where `fits` is false, times run backwards or shapes do not fit.
     """
     _require(motion, sensors)
+    checked(t0, x0, t, sensors, z)
     n, k, width = len(x0), len(t), tiles.WIDTH
-    if not len(sensors) == len(z) == k or not k or not n:
-        raise UserError("give one sensor and one set of measurements per time, at least one time and one track")
-    if not np.all(np.diff(t, prepend=t0) >= 0.0):
-        raise UserError("the reports' times must be finite, and none before t0 or the one before it")
-    if any(np.shape(row) != (n, s.dimension) for s, row in zip(sensors, z)):
-        raise UserError(f"measurements must be (N, m) with N = {n} tracks and m the components of the report's sensor")
     contexts, which = schedule(sensors)
     blocks, measured = layout(x0, P0, z)
     m = len(blocks)
@@ -195,11 +190,28 @@ def run_many(
             blocks[rows], t0, motion.q, times, measured[rows], contexts, which, score[rows], own
         )  # fmt: skip
 
-    _spread(part, m, threads)
-    x, P = _dense(blocks.reshape(m, 27, width).transpose(0, 2, 1).reshape(-1, 27)[:n])
-    sums = score.reshape(m, 2, width).transpose(1, 0, 2).reshape(2, -1)[:, :n]
+    spread(part, m, threads)
+    x, P = dense(out_of_tiles(blocks, n))
+    sums = out_of_tiles(score, n)
     path = kept.reshape(m, k, 27, width)[:, :, :6].transpose(1, 0, 3, 2).reshape(k, -1, 6)[:, :n] if keep else NO_TILES
-    return BatchResult(x, P, sums[0], sums[1], path)
+    return BatchResult(x, P, sums[:, 0], sums[:, 1], path)
+
+
+def checked(t0: float, x0: FloatArray, t: FloatArray, sensors: Sequence[KernelSensor], z: Sequence[FloatArray]) -> None:
+    """Raise UserError unless there is one sensor and one (N, m) per time, and times do not run backwards."""
+    n, k = len(x0), len(t)
+    if not len(sensors) == len(z) == k or not k or not n:
+        raise UserError("give one sensor and one set of measurements per time, at least one time and one track")
+    if not np.all(np.diff(t, prepend=t0) >= 0.0):
+        raise UserError("the reports' times must be finite, and none before t0 or the one before it")
+    if any(np.shape(row) != (n, s.dimension) for s, row in zip(sensors, z)):
+        raise UserError(f"measurements must be (N, m) with N = {n} tracks and m the components of the report's sensor")
+
+
+def out_of_tiles(blocks: FloatArray, n: int) -> FloatArray:
+    """Return N rows (N, c) of tiles (m, c·WIDTH): what `in_tiles` took apart."""
+    rows = blocks.reshape(len(blocks), -1, tiles.WIDTH).transpose(0, 2, 1)
+    return np.ascontiguousarray(rows).reshape(-1, rows.shape[2])[:n]
 
 
 def layout(x0: FloatArray, P0: FloatArray, z: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -209,18 +221,18 @@ def layout(x0: FloatArray, P0: FloatArray, z: Sequence[FloatArray]) -> tuple[Flo
     b = _numbers(np.asarray(x0, dtype=float), np.broadcast_to(P0, (n, 6, 6)))
     measured = np.full((m, len(z), max(row.shape[1] for row in z) * width), np.nan)
     for i, row in enumerate(z):
-        measured[:, i, : row.shape[1] * width] = _in_tiles(np.asarray(row, dtype=float), m).reshape(m, -1)
-    return _in_tiles(b, m).reshape(m, -1), measured
+        measured[:, i, : row.shape[1] * width] = in_tiles(np.asarray(row, dtype=float), m).reshape(m, -1)
+    return in_tiles(b, m).reshape(m, -1), measured
 
 
-def _in_tiles(rows: FloatArray, m: int) -> FloatArray:
+def in_tiles(rows: FloatArray, m: int) -> FloatArray:
     """Return (m, c, width) of N rows (N, c), the last one repeated to fill the last tile."""
     width = tiles.WIDTH
     full = np.concatenate((rows, np.repeat(rows[-1:], m * width - len(rows), axis=0)))
     return np.ascontiguousarray(full.reshape(m, width, -1).transpose(0, 2, 1))
 
 
-def _spread(part: Any, m: int, threads: int) -> None:
+def spread(part: Any, m: int, threads: int) -> None:
     """Call `part` on slices of m tiles, one slice a thread; the kernel runs without Python's lock."""
     workers = min(m, threads or os.cpu_count() or 1)
     if workers <= 1:

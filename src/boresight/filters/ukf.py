@@ -46,7 +46,7 @@ class UnscentedKalman:
         if not dt >= 0.0 or not math.isfinite(dt):
             raise UserError(f"cannot predict from t = {state.t!r} to t = {t!r}: time must not run backwards")
         X, L = self._points(state)
-        x, A, Omega = linearise(L, np.array([motion.transition(point, dt) for point in X]), self._scaling)
+        x, A, Omega = linearise(L, np.array([motion.transition(point, dt) for point in X]), self.scaling)
         return GaussianState(float(t), x, sandwich(A, state.P, Omega + motion.Q(state.x, dt)))
 
     def update(self, state: GaussianState, sensor: MeasurementModel, z: FloatArray) -> tuple[GaussianState, UpdateInfo]:
@@ -56,7 +56,7 @@ class UnscentedKalman:
         seen = np.isfinite(Y).all(axis=0)
         if not seen.any():
             raise UserError(ekf.NOTHING)
-        y, A, Omega = linearise(L, np.ascontiguousarray(Y[:, seen]), self._scaling)
+        y, A, Omega = linearise(L, np.ascontiguousarray(Y[:, seen]), self.scaling)
         R = sensor.R(state.x)[np.ix_(seen, seen)]
         x, P, S, nis, log_likelihood = joseph_update(state.x, state.P, y, -A, R + Omega, len(state.x))
         if math.isnan(nis):
@@ -70,18 +70,19 @@ class UnscentedKalman:
         out = [np.zeros(shape) for shape in shapes]
         done = ukf_stream(
             motion.kernel, motion.parameters, reports.observe, state.x, state.P, state.t, reports.t, reports.z,
-            reports.context, self._scaling, *out,
+            reports.context, self.scaling, *out,
         )  # fmt: skip
         require_all(done, reports)
         x, P, xp, Pp, F, nis = out
         return Filtered(reports.t, x, P, xp, Pp, F, nis[:, 0].copy(), nis[:, 1].copy())
 
     @property
-    def _scaling(self) -> FloatArray:
+    def scaling(self) -> FloatArray:
+        """Return (alpha, beta, kappa) (3,)."""
         return np.array([self.alpha, self.beta, self.kappa])
 
     def _points(self, state: GaussianState) -> tuple[FloatArray, FloatArray]:
-        X, L = sigma_points(state.x, state.P, self._scaling)
+        X, L = sigma_points(state.x, state.P, self.scaling)
         if np.isnan(X[0, 0]):
             raise UserError("the covariance is not positive definite: the unscented filter cannot draw its points")
         return X, L

@@ -1,4 +1,5 @@
-"""Angles without branches, so that a loop over many tracks is vectorised: four-quadrant arctangent and wrapping.
+"""Functions without branches, so that a loop over many tracks is vectorised: four-quadrant arctangent and wrapping;
+and the exponential.
 
 `FAST` are the compiler's settings of every kernel that takes part: products and sums may be fused, a division by zero
 gives infinity instead of an exception, and small functions are put where they are called.
@@ -55,3 +56,21 @@ def arctan2(y: float, x: float) -> float:
 def near(angle: float) -> float:
     """Wrap an angle to [-π, π] (rad)."""
     return angle - 2.0 * _PI * math.floor(angle * (0.5 / _PI) + 0.5)
+
+
+@njit(**INLINE)
+def exponential(x: float) -> float:
+    """Return exp(x) for |x| ≤ 60, limited to that, within 4e-14 of its value: exp(x/64) by its series, 64th power."""
+    t = min(max(x, -60.0), 60.0) * (1.0 / 64.0)
+    p = 1.0 / 355687428096000.0  # 1/17!
+    for n in (
+        20922789888000.0, 1307674368000.0, 87178291200.0, 6227020800.0, 479001600.0, 39916800.0, 3628800.0, 362880.0,
+        40320.0, 5040.0, 720.0, 120.0, 24.0, 6.0, 2.0, 1.0, 1.0,
+    ):  # fmt: skip
+        p = 1.0 / n + t * p
+    p = p * p
+    p = p * p
+    p = p * p
+    p = p * p
+    p = p * p
+    return p * p

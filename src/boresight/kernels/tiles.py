@@ -21,7 +21,8 @@ from boresight.types.sensor import FloatArray
 
 WIDTH = 64
 PRIOR = ROWS  # rows 27 … 32 of the work space: position and velocity before the report
-SCORE = ROWS + 6  # rows 33, 34: sum of NIS, of the components used
+NIS, DET = ROWS + 6, ROWS + 7  # of the last report: normalised innovation squared, determinant of S
+SCORE = ROWS + 8  # rows 35, 36: sum of NIS of the reports before, number of components used
 WORK = (SCORE + 2) * WIDTH
 SLOPE = 4  # rows of one component in `seen`: value, slope by position; range rate has three more, by velocity
 SEEN = (7 * SLOPE + 3) * WIDTH
@@ -30,7 +31,7 @@ RATE_SLOPE = 7 * SLOPE
 
 @njit(**FAST)
 def move_tile(b: FloatArray, dt: float, q: float) -> None:
-    """Move every track, and note position and velocity before the report."""
+    """Move every track, note position and velocity before the report, and begin its NIS and determinant."""
     for l in range(WIDTH):
         p, v, A, B, C = load(b, l, WIDTH)
         p, v, A, B, C = move(p, v, A, B, C, dt, q)
@@ -38,6 +39,9 @@ def move_tile(b: FloatArray, dt: float, q: float) -> None:
         for i in range(3):
             b[(PRIOR + i) * WIDTH + l] = p[i]
             b[(PRIOR + 3 + i) * WIDTH + l] = v[i]
+        b[SCORE * WIDTH + l] += b[NIS * WIDTH + l]
+        b[NIS * WIDTH + l] = 0.0
+        b[DET * WIDTH + l] = 1.0
 
 
 @njit(**FAST)
@@ -103,9 +107,10 @@ def condition_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r: float, tur
         y = z[l] - seen[l]
         y = near(y) if turn else y
         h = (seen[WIDTH + l], seen[2 * WIDTH + l], seen[3 * WIDTH + l])
-        p, v, A, B, C, nis, _ = condition(p, v, A, B, C, prior, h, y, r)
+        p, v, A, B, C, nis, s = condition(p, v, A, B, C, prior, h, y, r)
         store(b, l, WIDTH, p, v, A, B, C)
-        b[SCORE * WIDTH + l] += nis
+        b[NIS * WIDTH + l] += nis
+        b[DET * WIDTH + l] *= s
         b[(SCORE + 1) * WIDTH + l] += 1.0 if y == y else 0.0
 
 
@@ -117,11 +122,12 @@ def condition_angles_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r_a: f
         prior = (b[PRIOR * WIDTH + l], b[(PRIOR + 1) * WIDTH + l], b[(PRIOR + 2) * WIDTH + l])
         y_a, y_e = near(z[l] - seen[l]), near(z[WIDTH + l] - seen[SLOPE * WIDTH + l])
         h = (seen[WIDTH + l], seen[2 * WIDTH + l], seen[3 * WIDTH + l])
-        p, v, A, B, C, nis_a, _ = condition(p, v, A, B, C, prior, h, y_a, r_a)
+        p, v, A, B, C, nis_a, s_a = condition(p, v, A, B, C, prior, h, y_a, r_a)
         h = (seen[5 * WIDTH + l], seen[6 * WIDTH + l], seen[7 * WIDTH + l])
-        p, v, A, B, C, nis_e, _ = condition(p, v, A, B, C, prior, h, y_e, r_e)
+        p, v, A, B, C, nis_e, s_e = condition(p, v, A, B, C, prior, h, y_e, r_e)
         store(b, l, WIDTH, p, v, A, B, C)
-        b[SCORE * WIDTH + l] += nis_a + nis_e
+        b[NIS * WIDTH + l] += nis_a + nis_e
+        b[DET * WIDTH + l] *= s_a * s_e
         b[(SCORE + 1) * WIDTH + l] += (1.0 if y_a == y_a else 0.0) + (1.0 if y_e == y_e else 0.0)
 
 
@@ -136,9 +142,10 @@ def condition_rate_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r: float
         h = (seen[(row + 1) * WIDTH + l], seen[(row + 2) * WIDTH + l], seen[(row + 3) * WIDTH + l])
         g = (seen[RATE_SLOPE * WIDTH + l], seen[(RATE_SLOPE + 1) * WIDTH + l], seen[(RATE_SLOPE + 2) * WIDTH + l])
         y = z[l] - seen[row * WIDTH + l]
-        p, v, A, B, C, nis, _ = condition_rate(p, v, A, B, C, prior, prior_v, h, g, y, r)
+        p, v, A, B, C, nis, s = condition_rate(p, v, A, B, C, prior, prior_v, h, g, y, r)
         store(b, l, WIDTH, p, v, A, B, C)
-        b[SCORE * WIDTH + l] += nis
+        b[NIS * WIDTH + l] += nis
+        b[DET * WIDTH + l] *= s
         b[(SCORE + 1) * WIDTH + l] += 1.0 if y == y else 0.0
 
 
@@ -216,7 +223,7 @@ def run_tiles(
     work, seen = room[:WORK], room[WORK:]
     for i in range(tiles.shape[0]):
         work[: ROWS * WIDTH] = tiles[i]
-        work[SCORE * WIDTH :] = 0.0
+        work[NIS * WIDTH :] = 0.0
         now = t0
         for k in range(t.shape[0]):
             move_tile(work, t[k] - now, q)
@@ -226,3 +233,4 @@ def run_tiles(
                 kept[i, k] = work[: ROWS * WIDTH]
         tiles[i] = work[: ROWS * WIDTH]
         score[i] = work[SCORE * WIDTH :]
+        score[i, :WIDTH] += work[NIS * WIDTH : DET * WIDTH]
