@@ -11,9 +11,10 @@ from benchmarks.filters import MOTION, P0, SENSORS, X0
 from benchmarks.timing import FUSED_TIMES, Contenders, Row, peak, row, timed
 from boresight.filters import ekf, packed, stream
 from boresight.filters.imm import InteractingModels
-from boresight.filters.many import run_many_imm, run_many_ukf
+from boresight.filters.many import MSC_ORDER, run_many_imm, run_many_msc, run_many_ukf
+from boresight.filters.msc import MscFilter
 from boresight.filters.ukf import UnscentedKalman
-from boresight.kernels import imm_tiles, tiles, ukf_tiles
+from boresight.kernels import imm_tiles, msc_tiles, tiles, ukf_tiles
 from boresight.models import NearlyConstantVelocity
 
 # Operations of the straight-line algebra, an update and the prediction before it: radar (3 components), infrared (2)
@@ -59,7 +60,7 @@ def kernel(s: Study) -> Callable[[], None]:
 
 
 MODELS = InteractingModels((MOTION, NearlyConstantVelocity(q=20.0)), (10.0, 5.0))
-UKF = UnscentedKalman()
+UKF, MSC = UnscentedKalman(), MscFilter()
 
 
 def imm_kernel(s: Study) -> Callable[[], None]:
@@ -83,12 +84,30 @@ def ukf_kernel(s: Study) -> Callable[[], None]:
     )
 
 
+def msc_kernel(s: Study) -> Callable[[], None]:
+    """The filter in modified spherical coordinates, its observer at rest, laid out."""
+    contexts, which = packed.schedule(s.sensors)
+    full = [z if z.shape[1] == 3 else np.insert(z, 0, 0.0, axis=1) for z in s.z]
+    start, own = MSC.init(0.0, X0, P0), np.zeros((len(s.t), 6))
+    y0, P = np.tile(start.y[MSC_ORDER], (len(s.x0), 1)), start.Py[np.ix_(MSC_ORDER, MSC_ORDER)]
+    blocks, measured = packed.layout(y0, P, full)
+    score = np.empty((len(blocks), 2 * tiles.WIDTH))
+    return lambda: msc_tiles.run_msc_tiles(
+        blocks.copy(), 0.0, MOTION.q, own[0], own, s.t, measured, contexts, which, score
+    )
+
+
 def agree(s: Study) -> None:
     """Hold the tiles of the other filters against the streams of their filters, for one track."""
     start, reports = ekf.init(0.0, s.x0[0], P0), stream.stack(s.t, s.sensors, [z[0] for z in s.z])
     one = MODELS.run(MODELS.init(0.0, s.x0[0], P0, [0.0, 0.0]), reports)
     many = run_many_imm(MODELS, 0.0, s.x0, P0, s.t, s.sensors, s.z, threads=1)
     np.testing.assert_allclose(many.x[0], one.x[-1], rtol=0, atol=1e-6)
+    begin, own = MSC.init(0.0, X0, P0), np.zeros((len(s.t), 6))
+    y0 = np.tile(begin.y, (len(s.x0), 1))
+    spherical = run_many_msc(MOTION, 0.0, y0, begin.Py, own[0], s.t, s.sensors, s.z, own, threads=1)
+    alone = MSC.run(begin, MOTION, reports, own)
+    np.testing.assert_allclose(spherical.x[0], alone.x[-1], rtol=0, atol=1e-8)
     whole = run_many_ukf(UKF, MOTION, 0.0, s.x0, P0, s.t, s.sensors, s.z, threads=1)
     np.testing.assert_allclose(whole.x[0], UKF.run(start, MOTION, reports).x[-1], rtol=0, atol=1e-6)
 
@@ -131,6 +150,7 @@ def rows(quick: bool) -> list[Row]:
         "boresight": (kernel(big), 1024 * 200),
         "boresight, with layout": (lambda: ours(big), 1024 * 200),
         "boresight, IMM of two models": (imm_kernel(big), 1024 * 200),
+        "boresight, MSC": (msc_kernel(big), 1024 * 200),
         "boresight, UKF": (ukf_kernel(big), 1024 * 200),
         "NumPy batched": (lambda: numpy_batched(study_part), 1024 * 20),
         "peak": (peak, 2 * 128 * FUSED_TIMES),

@@ -10,7 +10,8 @@ import pytest
 from boresight.errors import UserError
 from boresight.filters import ekf, packed, stream
 from boresight.filters.imm import InteractingModels
-from boresight.filters.many import run_many_imm, run_many_ukf
+from boresight.filters.many import run_many_imm, run_many_msc, run_many_ukf
+from boresight.filters.msc import MscFilter
 from boresight.filters.ukf import UnscentedKalman
 from boresight.kernels.arctan import exponential
 from boresight.kernels.imm import markov
@@ -79,6 +80,37 @@ def test_ukf_tiles_equal_the_ukf(scaling: tuple[float, float, float]) -> None:
         assert many.nis[i] == pytest.approx(one.nis.sum(), rel=1e-6)
         assert many.dof[i] == one.dof.sum()
     assert np.abs(many.x - plain.x).max() > 1e-3  # it is not the EKF
+
+
+def test_msc_tiles_equal_the_msc_filter() -> None:
+    """An observer that turns; infrared alone, then range once in a while."""
+    rng, k, n, msc = np.random.default_rng(3), 60, 70, MscFilter()
+    t = np.cumsum(rng.uniform(0.0, 0.4, k))
+    own = np.stack((20 * t, 5 * np.sin(t), np.zeros(k), np.full(k, 20.0), 5 * np.cos(t), np.zeros(k)), axis=1)
+    own0 = np.array([0.0, 0, 0, 20, 5, 0])
+    sensors, z = [], []
+    for i, now in enumerate(t):
+        sensors.append((Radar(5.0, 0.01, 0.01) if i % 7 == 6 else Infrared(2e-3, 2e-3)).at(SensorPose(own[i, :3])))
+        truth = X0 + np.r_[now * X0[3:], np.zeros(3)]
+        noise = rng.normal(size=(n, sensors[i].dimension)) * np.sqrt(np.diag(sensors[i].R(truth)))
+        z.append(sensors[i].h(truth) + noise)
+        z[-1][rng.random(n) < 0.15] = np.nan
+    motion = NearlyConstantVelocity(2.0)
+    start = msc.init(0.0, X0, P0, own0)
+    many = run_many_msc(
+        motion, 0.0, np.tile(start.y, (n, 1)), start.Py, own0, t, sensors, z, own, threads=1
+    )  # fmt: skip
+    for i in (0, 33, 69):
+        one = msc.run(start, motion, stream.stack(t, sensors, [row[i] for row in z]), own)
+        error = many.x[i] - one.x[-1]
+        error[2] = math.remainder(error[2], 2 * math.pi)
+        np.testing.assert_allclose(error, 0.0, atol=1e-9 * np.abs(one.x[-1]).max())
+        sigma = np.sqrt(np.diag(one.P[-1]))
+        np.testing.assert_allclose(many.P[i] / np.outer(sigma, sigma), one.P[-1] / np.outer(sigma, sigma), atol=1e-8)
+        assert many.nis[i] == pytest.approx(one.nis.sum(), rel=1e-6)
+        assert many.dof[i] == one.dof.sum()
+    with pytest.raises(UserError, match="at the observer"):
+        run_many_msc(motion, 0.0, start.y[None], start.Py, own0, t, [SENSORS[1]] * k, [row[:1, -2:] for row in z], own)
 
 
 def test_mistakes_are_named() -> None:

@@ -1,4 +1,4 @@
-"""Interacting models and the unscented filter for thousands of tracks that share a schedule, as `packed.run_many`."""
+"""IMM, unscented and MSC filter for thousands of tracks that share a schedule of reports, as `packed.run_many`."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from boresight.errors import UserError
 from boresight.filters.imm import InteractingModels
 from boresight.filters.packed import BatchResult, checked, dense, fits, layout, out_of_tiles, schedule, spread
 from boresight.filters.ukf import UnscentedKalman
-from boresight.kernels import imm_tiles, tiles, ukf_tiles
+from boresight.kernels import imm_tiles, msc_tiles, tiles, ukf_tiles
 from boresight.models.base import KernelSensor
 from boresight.models.motion import NearlyConstantVelocity
 from boresight.types.enums import Component
 from boresight.types.sensor import FloatArray
 
+MSC_ORDER = [2, 0, 5, 3, 1, 4]  # azimuth, elevation, 1/range and their rates, as indices into MscState.y
 POLAR = ([Component.RANGE, Component.AZIMUTH, Component.ELEVATION], [Component.AZIMUTH, Component.ELEVATION])
 
 
@@ -110,3 +111,52 @@ def run_many_ukf(
     x, P = dense(out_of_tiles(blocks, n))
     sums = out_of_tiles(score, n)
     return BatchResult(x, P, sums[:, 0], sums[:, 1], np.empty((0, n, 6)))
+
+
+def run_many_msc(
+    motion: NearlyConstantVelocity,
+    t0: float,
+    y0: FloatArray,
+    P0: FloatArray,
+    own0: FloatArray,
+    t: FloatArray,
+    sensors: Sequence[KernelSensor],
+    z: Sequence[FloatArray],
+    own: FloatArray,
+    *,
+    threads: int = 0,
+) -> BatchResult:
+    """Filter N tracks in modified spherical coordinates: y0 (N, 6) and P0 as in `MscState`, the observer at own (k, 6).
+
+    Sensors as `run_many_ukf`, standing at the observer with north-aligned axes. Results are in MSC. Raises UserError.
+    """
+    if not fits(motion, sensors) or any(list(s.components) not in POLAR for s in sensors):
+        raise UserError(
+            "run_many_msc takes NearlyConstantVelocity in 3 dimensions, and sensors of (range,) azimuth, elevation"
+        )
+    checked(t0, y0, t, sensors, z)
+    if np.shape(own) != (len(t), 6) or np.shape(own0) != (6,):
+        raise UserError(f"the observer needs one position and velocity a report: ({len(t)}, 6), and (6,) at t0")
+    for sensor, place in zip(sensors, own):
+        if not np.array_equal(sensor.pose.enu_from_sensor, np.eye(3)) or np.any(sensor.pose.position != place[:3]):
+            raise UserError(
+                "sensors must stand at the observer with north-aligned axes: sensor.at(SensorPose(position))"
+            )
+    contexts, which = schedule(sensors)
+    full = [row if s.dimension == 3 else np.insert(row, 0, 0.0, axis=1) for s, row in zip(sensors, z)]
+    P = np.broadcast_to(P0, (len(y0), 6, 6))[:, MSC_ORDER][:, :, MSC_ORDER]
+    blocks, measured = layout(np.asarray(y0, dtype=float)[:, MSC_ORDER], P, full)
+    m, n, width = len(blocks), len(y0), tiles.WIDTH
+    times, score = np.ascontiguousarray(t, dtype=float), np.empty((m, 2 * width))
+    start, path = np.array(own0, dtype=float), np.array(own, dtype=float)
+
+    def part(rows: slice) -> None:
+        msc_tiles.run_msc_tiles(
+            blocks[rows], t0, motion.q, start, path, times, measured[rows], contexts, which, score[rows]
+        )  # fmt: skip
+
+    spread(part, m, threads)
+    y, P = dense(out_of_tiles(blocks, n))
+    back = np.argsort(MSC_ORDER)
+    sums = out_of_tiles(score, n)
+    return BatchResult(y[:, back], P[:, back][:, :, back], sums[:, 0], sums[:, 1], np.empty((0, n, 6)))

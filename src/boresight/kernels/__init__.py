@@ -7,10 +7,14 @@ import os
 import shutil
 import sys
 import tempfile
+from typing import Any
 
-from numba import config, njit
+import numba
+from numba import njit
 
 from boresight.errors import UserError
+
+config: Any = numba.config
 
 
 def _probe() -> None:
