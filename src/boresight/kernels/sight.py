@@ -24,8 +24,9 @@ def polar(d: Three) -> Polar:
     r2 = flat2 + d[2] * d[2]
     flat, r = math.sqrt(flat2), math.sqrt(r2)
     aloft = flat <= 1e-12 * r
-    w = 1.0 / (r * flat if flat2 > 0.0 else 1.0)
-    i_flat, i_r = (0.0 if aloft else w * r), (1.0 / r if aloft and r > 0.0 else w * flat)
+    other = r if aloft else flat
+    w = 1.0 / (r * other if r > 0.0 else 1.0)  # one division for both reciprocals
+    i_flat, i_r = (0.0 if aloft else w * r), w * other
     e, n, s, c = d[0] * i_flat, d[1] * i_flat, d[2] * i_r, flat * i_r
     azimuth, elevation = arctan2(d[0], d[1]), arctan2(d[2], flat)
     return (

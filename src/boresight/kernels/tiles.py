@@ -31,14 +31,13 @@ RATE_SLOPE = 7 * SLOPE
 
 @njit(**FAST)
 def move_tile(b: FloatArray, dt: float, q: float) -> None:
-    """Move every track, note position and velocity before the report, and begin its NIS and determinant."""
+    """Move every track, note its position before the report, and begin its NIS and determinant."""
     for l in range(WIDTH):
         p, v, A, B, C = load(b, l, WIDTH)
         p, v, A, B, C = move(p, v, A, B, C, dt, q)
         store(b, l, WIDTH, p, v, A, B, C)
         for i in range(3):
             b[(PRIOR + i) * WIDTH + l] = p[i]
-            b[(PRIOR + 3 + i) * WIDTH + l] = v[i]
         b[SCORE * WIDTH + l] += b[NIS * WIDTH + l]
         b[NIS * WIDTH + l] = 0.0
         b[DET * WIDTH + l] = 1.0
@@ -76,11 +75,10 @@ def see_rate(b: FloatArray, seen: FloatArray, s: Three, u: Three) -> None:
     row = 3 * SLOPE
     for l in range(WIDTH):
         d = (b[PRIOR * WIDTH + l] - s[0], b[(PRIOR + 1) * WIDTH + l] - s[1], b[(PRIOR + 2) * WIDTH + l] - s[2])
-        w = (
-            b[(PRIOR + 3) * WIDTH + l] - u[0],
-            b[(PRIOR + 4) * WIDTH + l] - u[1],
-            b[(PRIOR + 5) * WIDTH + l] - u[2],
-        )
+        v = (b[3 * WIDTH + l], b[4 * WIDTH + l], b[5 * WIDTH + l])  # nothing has been conditioned on yet
+        for i in range(3):
+            b[(PRIOR + 3 + i) * WIDTH + l] = v[i]
+        w = (v[0] - u[0], v[1] - u[1], v[2] - u[2])
         rate, h, g = range_rate(d, w)
         seen[row * WIDTH + l] = rate
         for i in range(3):
@@ -132,6 +130,28 @@ def condition_angles_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r_a: f
 
 
 @njit(**FAST)
+def condition_polar_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r: float, r_a: float, r_e: float) -> None:
+    """Condition on range, azimuth and elevation in one pass: `seen` (12·WIDTH,), `z` (3·WIDTH,)."""
+    for l in range(WIDTH):
+        p, v, A, B, C = load(b, l, WIDTH)
+        prior = (b[PRIOR * WIDTH + l], b[(PRIOR + 1) * WIDTH + l], b[(PRIOR + 2) * WIDTH + l])
+        y = z[l] - seen[l]
+        y_a = near(z[WIDTH + l] - seen[SLOPE * WIDTH + l])
+        y_e = near(z[2 * WIDTH + l] - seen[2 * SLOPE * WIDTH + l])
+        h = (seen[WIDTH + l], seen[2 * WIDTH + l], seen[3 * WIDTH + l])
+        p, v, A, B, C, nis, s = condition(p, v, A, B, C, prior, h, y, r)
+        h = (seen[5 * WIDTH + l], seen[6 * WIDTH + l], seen[7 * WIDTH + l])
+        p, v, A, B, C, nis_a, s_a = condition(p, v, A, B, C, prior, h, y_a, r_a)
+        h = (seen[9 * WIDTH + l], seen[10 * WIDTH + l], seen[11 * WIDTH + l])
+        p, v, A, B, C, nis_e, s_e = condition(p, v, A, B, C, prior, h, y_e, r_e)
+        store(b, l, WIDTH, p, v, A, B, C)
+        b[NIS * WIDTH + l] += nis + nis_a + nis_e
+        b[DET * WIDTH + l] *= s * s_a * s_e
+        used = (1.0 if y == y else 0.0) + (1.0 if y_a == y_a else 0.0) + (1.0 if y_e == y_e else 0.0)
+        b[(SCORE + 1) * WIDTH + l] += used
+
+
+@njit(**FAST)
 def condition_rate_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r: float) -> None:
     """As `condition_tile` for range rate, `seen` (31·WIDTH,) being all components."""
     row = 3 * SLOPE
@@ -176,7 +196,10 @@ def report_tile(b: FloatArray, seen: FloatArray, z: FloatArray, c: FloatArray) -
         r = c[NOISE + 8 * i]
         if r > 0.0:
             part, rows = z[row * WIDTH :], seen[SLOPE * i * WIDTH :]
-            if i == 1 and c[NOISE + 16] > 0.0:
+            if i == 0 and c[NOISE + 8] > 0.0 and c[NOISE + 16] > 0.0:
+                condition_polar_tile(b, rows, part, r, c[NOISE + 8], c[NOISE + 16])
+                row, i = row + 2, 2
+            elif i == 1 and c[NOISE + 16] > 0.0:
                 condition_angles_tile(b, rows, part, r, c[NOISE + 16])
                 row, i = row + 1, 2
             elif i == 3:
