@@ -171,3 +171,22 @@ def test_weights_are_shares_of_information() -> None:
     feed(POINTER, state, np.array([7.0]), "g", rng)
     state.guide.scale[:] = 1.0
     np.testing.assert_allclose(POINTER.weights(state, late), [0.0, 1.0, 0.0])
+
+
+def test_no_report_however_wrong_ends_it() -> None:
+    """A target at the antenna, at its sensor, at the Earth's centre, or anywhere: a command or none; then it heals."""
+    rng, state = np.random.default_rng(37), POINTER.init()
+    wild = [HERE, np.zeros(3), 1e12 * np.ones(3), -HERE, np.full(3, 1e-300)]
+    for k in range(600):
+        t = 0.1 * k
+        where = wild[k % len(wild)] if k % 3 else ecef(t) * rng.uniform(0.5, 2.0)
+        POINTER.take(state, 1, t, where)
+        POINTER.take(
+            state, 0, t, np.array([rng.uniform(-9, 9), rng.uniform(-1.6, 1.6), 10.0 ** rng.uniform(-3, 12)]), where, R
+        )
+        state, out = POINTER.tick(state, t)
+        assert out is None or np.isfinite([out.aim.azimuth, out.aim.elevation, out.aim.sigma, out.aim.p_in_beam]).all()
+    feed(POINTER, state, np.arange(60.0, 90.0, 0.25), "rgo", rng)
+    state, out = POINTER.tick(state, 90.0)
+    assert out is not None
+    assert separation(out.aim.direction, enu(90.5)) < 1.0 * DEG

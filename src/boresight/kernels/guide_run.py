@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from boresight.kernels.guide import ACCELERATION, EARTH_RATE, ORBIT, TRACK, WORK, advance, look_at, spin
-from boresight.kernels.guide_update import bring_to, report_position, start, update
+from boresight.kernels.guide_update import CLIP, bring_to, report_position, start, update
 from boresight.types.sensor import FloatArray
 
 # Where a filter's settings and running numbers stand in their arrays.
@@ -52,7 +52,7 @@ def step(
             continue
         n = m if h == 0 else m + 3
         e, l, s = update(X[h], P[h], n, lag, h == source + 1, dynamics, q, kind, k, settings[S_GATE], w)
-        L[h] += l
+        L[h] += l if l - l == 0.0 else -CLIP
         if h == best:
             nis, share = e, s
             fate = ACCEPTED if e <= settings[S_GATE] else REJECTED

@@ -73,7 +73,7 @@ def condition(n: int, x: FloatArray, P: FloatArray, k: int, gate: float, w: Floa
         for i in range(n):
             w[G + j, i] *= d
         nis += w[Y, j] * w[Y, j]
-    if nis > gate:
+    if not nis <= gate:  # also one that is not a number
         return nis, det
     for j in range(k):
         a = w[Y, j]

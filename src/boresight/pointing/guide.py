@@ -165,7 +165,8 @@ class GuideFilter:
         covariance of axes axes' (`GuideSource.axes_of`).
         """
         s = self.sources[source]
-        if s.correlation is not None and abs(t - state.looked[source]) < s.correlation:
+        begun = state.clock[kernel.C_STARTED] != 0.0
+        if begun and s.correlation is not None and abs(t - state.looked[source]) < s.correlation:
             return THINNED
         fate = int(
             kernel.step(
@@ -182,6 +183,11 @@ class GuideFilter:
         out = Predicted(np.empty(3), np.empty(3), np.empty((3, 3)))
         ok = kernel.predict_to(state.clock, state.X, state.P, self._settings, t, *out, state.work)
         return out if ok else None
+
+    def restart_now(self, state: GuideState) -> None:
+        """Forget the target, in the state's own arrays: the next report with a position begins anew."""
+        state.clock[kernel.C_STARTED] = 0.0
+        state.clock[kernel.C_RESTARTS] += 1.0
 
     def run(self, reports: Reports, node: ArrayLike, aim: ArrayLike) -> Run:
         """Step through reports, predicting at each `node` (k,) (s) to its `aim` time (k,) from what had arrived.

@@ -113,6 +113,9 @@ class Pointer:
     def tick(self, state: PointerState, t: float, place: Place | None = None) -> tuple[PointerState, Pointing | None]:
         """Return the command at time `t` (s); None before the first report with a range.
 
+        A target without a direction, or one whose covariance has broken down, is forgotten (None): no report, however
+        wrong, is to end the service.
+
         `place` is the antenna's at the time it aims for, if it moves; azimuth and elevation are in the site's ENU, the
         mount's in the platform's axes. With a place whose attitude is lost (NaN) the mode says so, and P(in beam), face
         and mount angles are NaN.
@@ -127,7 +130,11 @@ class Pointer:
         args = (face, self.pole, 0.5 * self.beam_width)
         to_target, velocity = (predicted.position - here) @ R, predicted.velocity @ R
         covariance = R.T @ predicted.covariance @ R
-        aim = aim_at(to_target, velocity, covariance, *args)
+        try:
+            aim = aim_at(to_target, velocity, covariance, *args)
+        except UserError:
+            self.guide.restart_now(state.guide)
+            return state, None
         mode = self._mode(state, t, aim)
         if mode == Mode.SEARCH:
             begun = state.search_begun if state.mode == Mode.SEARCH else t

@@ -169,6 +169,6 @@ def _warm(pointer: Pointer) -> PointerState:
     here = np.array([7e6, 0.0, 0.0])
     for source, s in enumerate(pointer.guide.sources):
         z = np.array([0.1, 0.2, 1e5]) if s.kind == DIRECTION else here
-        pointer.take(scratch, source, 0.0, z, here, np.eye(3))
+        pointer.take(scratch, source, 0.0, z, 0.9 * here, np.eye(3))
         pointer.tick(scratch, 0.5)
     return pointer.init()
