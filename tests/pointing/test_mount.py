@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boresight.errors import UserError
+from boresight.frames.tangent import separation
 from boresight.pointing.mount import Mount, MountState
 
 DEG = np.pi / 180
@@ -78,3 +79,53 @@ def test_the_mask_is_not_a_stop() -> None:
     assert mount.reach(np.pi / 4, 5 * DEG, 0.0).elevation == pytest.approx(5 * DEG)
     with pytest.raises(UserError, match="stop"):
         Mount(elevation=(1.0, 0.0))
+
+
+def beside_zenith(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A straight line at 500 km, 20 km beside the zenith at 7.5 km/s: azimuth swings by 180° in seconds."""
+    x, y = 7.5 * t, np.full_like(t, 20.0)
+    return np.arctan2(x, y), np.arctan2(500.0, np.hypot(x, y))
+
+
+def test_foreseeing_halves_the_error_of_the_keyhole() -> None:
+    """Tick by tick it is `plan`; without looking ahead the mount is as late afterwards as both errors together."""
+    mount = Mount(azimuth_rate=np.radians(4.0), elevation_rate=np.radians(4.0))
+    t = np.arange(-60.0, 60.0, 0.5)
+    azimuth, elevation = beside_zenith(t)
+    plan = mount.plan(t, azimuth, elevation)
+    ahead = np.arange(0.0, 46.0, 0.5)
+    here = late = blind = MountState(float(azimuth[0]), float(elevation[0]))
+    worst, worst_blind, made = 0.0, 0.0, []
+    for k, now in enumerate(t):
+        late, aim = mount.foresee(late, *beside_zenith(now + ahead), 0.5, 0.5)
+        new = mount.step(here, aim.azimuth, aim.elevation, 0.5)
+        assert abs(new.azimuth - here.azimuth) <= mount.azimuth_rate * 0.5 + 1e-12
+        here, blind = new, mount.step(blind, float(azimuth[k]), float(elevation[k]), 0.5)
+        wanted = direction(azimuth[k], elevation[k])
+        worst = max(worst, float(separation(direction(*here), wanted)))
+        worst_blind = max(worst_blind, float(separation(direction(*blind), wanted)))
+        made.append(here.azimuth)
+    assert worst < 0.75 * worst_blind
+    assert worst < 1.1 * plan.error.max()
+    np.testing.assert_allclose(made[60:180], plan.azimuth[60:180], atol=np.radians(4.0))
+
+
+def direction(azimuth: float, elevation: float) -> np.ndarray:
+    c = np.cos(elevation)
+    return np.array([c * np.sin(azimuth), c * np.cos(azimuth), np.sin(elevation)])
+
+
+def test_foreseeing_keeps_the_stops() -> None:
+    rng = np.random.default_rng(9)
+    mount = Mount((-2.0, 2.0), (0.1, 1.4), 0.1, 0.1)
+    late = here = MountState(0.0, 0.5)
+    for _ in range(500):
+        azimuth = np.cumsum(rng.normal(0.0, rng.choice([0.01, 0.5]), 30)) + rng.uniform(-9, 9)
+        if rng.random() < 0.1:
+            azimuth[rng.integers(30)] = np.nan
+        late, aim = mount.foresee(late, azimuth, rng.uniform(-2, 2, 30), 0.5, 0.5)
+        new = mount.step(here, aim.azimuth, aim.elevation, 0.5)
+        assert -2.0 <= new.azimuth <= 2.0
+        assert 0.1 <= new.elevation <= 1.4
+        assert abs(new.azimuth - here.azimuth) <= 0.05 + 1e-12
+        here = new

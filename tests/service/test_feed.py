@@ -94,6 +94,9 @@ def test_a_hundred_thousand_mutants() -> None:
     which, kinds = rng.integers(len(seeds), size=100_000), rng.integers(5, size=100_000)
     noise = rng.integers(256, size=(100_000, 3))
     places = rng.random((100_000, 3))
+    for m in (SHIP, GOOD, PLACE, TRACK):  # compile first: that takes memory of its own
+        for report in feed().parse(json.dumps(m).encode(), 1000.0):
+            POINTER.take(POINTER.init(), *report)
     tracemalloc.start()
     base = tracemalloc.get_traced_memory()[0]
     for i in range(100_000):

@@ -280,7 +280,9 @@ def test_no_command_outside_the_limits_is_ever_sent() -> None:
     for i in range(400):
         now += 0.25
         wild = rng.choice([np.nan, np.inf, 1e9, -50.0, 0.5, 2.0])
-        rotator.follow(float(wild if i % 3 else rng.uniform(-4, 4)), float(rng.uniform(-2, 2)), now)
+        ahead = np.cumsum(rng.normal(0.0, 0.3, 20)) + rng.uniform(-9, 9), rng.uniform(-2, 2, 20)
+        path = (lambda told=ahead: told) if i % 2 else None
+        rotator.follow(float(wild if i % 3 else rng.uniform(-4, 4)), float(rng.uniform(-2, 2)), now, path)
         time.sleep(0.001)
     rotator.close()
     fake.join(2.0)

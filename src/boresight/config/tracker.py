@@ -118,9 +118,7 @@ def read_tracker_config(path: Path, sensor_ids: list[str]) -> TrackerConfig:
     """Read a tracker configuration for a recording with these sensors; raises UserError with file and key."""
     config, pipeline = read_configuration(path, sensor_ids)
     if pipeline:
-        raise UserError(
-            f"{path}: [pipeline] is applied by `boresight track` and `compare` only; leave it out here"
-        )
+        raise UserError(f"{path}: [pipeline] is applied by `boresight track` and `compare` only; leave it out here")
     return config
 
 

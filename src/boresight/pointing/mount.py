@@ -76,6 +76,24 @@ class Mount:
             min(max(a, self.azimuth[0]), self.azimuth[1]), min(max(e, self.elevation[0]), self.elevation[1])
         )
 
+    def foresee(
+        self, late: MountState, azimuth: FloatArray, elevation: FloatArray, spacing: float, dt: float
+    ) -> tuple[MountState, MountState]:
+        """Return a follower's next position and the command, for directions (n,) (rad) from now, `spacing` (s) apart.
+
+        `plan`, tick by tick: `late` follows without looking ahead; the command is the mean of it and of where azimuth
+        must be by now if it is to be in time for all that comes. Where the winding runs out, it is the follower's.
+        """
+        late = self.step(late, float(azimuth[0]), float(elevation[0]), dt)
+        if not np.isfinite(azimuth).all():
+            return late, late
+        wanted = np.unwrap(azimuth)
+        wanted += self.reach(float(azimuth[0]), 0.0, late.azimuth).azimuth - wanted[0]
+        if wanted.min() < self.azimuth[0] or wanted.max() > self.azimuth[1]:
+            return late, late
+        early = float(_limited(wanted[::-1], np.full(len(wanted) - 1, self.azimuth_rate * spacing))[-1])
+        return late, MountState(0.5 * (late.azimuth + early), late.elevation)
+
     def visible(self, azimuth: FloatArray, elevation: FloatArray) -> NDArray[np.bool_]:
         """Return (n,) whether directions stand above the horizon mask (linear between its corners) or 0°."""
         if not self.mask:

@@ -156,6 +156,21 @@ class Pointer:
         azimuth, elevation, _ = azel_from_enu(*on_board)
         return state, Pointing(t, t + self.lead, aim, mode, azimuth, elevation)
 
+    def path(self, state: PointerState, t: float, ahead: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+        """Return azimuth and elevation (n,) (rad) of the target, as commanded `ahead` (n,) (s) of `t` (s).
+
+        None where there is none, or where it cannot be foretold: off an orbit, manoeuvres begin within seconds.
+        """
+        predicted = (
+            [self.guide.predict(state.guide, t + self.lead + float(s)) for s in ahead] if self.guide.orbit else []
+        )
+        R, here, _ = _geometry(self.site, self.face)
+        to = np.array([(p.position - here) @ R for p in predicted if p is not None])
+        if not len(to) or not (np.linalg.norm(to, axis=1) > 0.0).all():
+            return None
+        azimuth, elevation, _ = azel_from_enu(to[:, 0], to[:, 1], to[:, 2])
+        return np.asarray(azimuth), np.asarray(elevation)
+
     def ages(self, state: PointerState, t: float) -> FloatArray:
         """Return how old each source's last good report is (s), infinite before the first."""
         return t - state.last

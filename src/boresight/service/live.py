@@ -7,22 +7,25 @@ import select
 import socket
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, TextIO
 
 import msgspec
+import numpy as np
 
 from boresight.config.site import Station
 from boresight.errors import UserError
 from boresight.kernels.guide import DIRECTION
-from boresight.pointing.pointer import Pointer, PointerState, Pointing
+from boresight.pointing.pointer import Mode, Pointer, PointerState, Pointing
 from boresight.service.elements import Elements
 from boresight.service.feed import PER_READ, Feed, Stand
 from boresight.service.navigation import Navigation
-from boresight.service.rotctld import Rotator
+from boresight.service.rotctld import SPACING, Rotator
 from boresight.service.sockets import Broadcast, Input, Serial, Tcp, Udp, address
 from boresight.types import Axes
 
 POLL = 0.005  # s between looks at inputs that cannot be waited for
+FURTHEST = 120.0  # s that a pass is looked ahead
 SHOW = 0.1  # s between status lines
 
 
@@ -50,6 +53,8 @@ def run_live(
     if file.output.rotctld:
         band, period = math.radians(file.output.dead_band_deg), 1.0 / file.output.command_rate_hz
         rotator = Rotator(file.output.rotctld, station.mount, band, period)
+    # half a turn: more is never to be made good
+    ahead = np.arange(0.0, min(math.pi / station.mount.azimuth_rate, FURTHEST) + SPACING, SPACING)
     elements = Elements(pointer, station.elements)
     state, begun = _warm(pointer), clock()
     tick, ticks, latency, total, answers, busy = begun, 0, 0.0, 0.0, 0, time.process_time()
@@ -73,7 +78,8 @@ def run_live(
                 if stream is not None:
                     stream.send(encode(pointing))
                 if rotator is not None:
-                    rotator.follow(pointing.mount_azimuth, pointing.mount_elevation, now)
+                    path = partial(pointer.path, state, now, ahead) if steady(carrier, pointing) else None
+                    rotator.follow(pointing.mount_azimuth, pointing.mount_elevation, now, path)
                 if not math.isnan(arrived):
                     took = clock() - arrived if ticks else 0.0
                     latency, total, answers = max(latency, took), total + took, answers + (ticks > 0)
@@ -106,6 +112,11 @@ def run_live(
         **feed.counts,
     }
     return found | ({f"rotator_{k}": v for k, v in rotator.counts.items()} if rotator else {})
+
+
+def steady(carrier: Navigation | None, p: Pointing) -> bool:
+    """Return whether the mount's way can be foretold: it stands on the ground and does not search."""
+    return carrier is None and p.mode in (Mode.FUSED, Mode.OWN, Mode.COAST)
 
 
 def encode(p: Pointing) -> bytes:
@@ -163,8 +174,6 @@ def _wait(inputs: list[Input], longest: float) -> None:
 
 def _warm(pointer: Pointer) -> PointerState:
     """Compile the kernels before the first report, on a filter that is thrown away."""
-    import numpy as np
-
     scratch = pointer.init()
     here = np.array([7e6, 0.0, 0.0])
     for source, s in enumerate(pointer.guide.sources):

@@ -5,12 +5,17 @@ from __future__ import annotations
 import errno
 import math
 import socket
+from collections.abc import Callable
 
 from boresight.frames.tangent import separation
 from boresight.pointing.mount import Mount, MountState
 from boresight.service.sockets import address
+from boresight.types.sensor import FloatArray
+
+Path = Callable[[], tuple[FloatArray, FloatArray] | None]
 
 RETRY = 1.0  # s between attempts to connect
+SPACING = 0.5  # s between the directions of a path
 SILENT = 3.0  # s without an answer after which the connection is given up
 
 
@@ -33,10 +38,15 @@ class Rotator:
         self.position: MountState | None = None  # read back
         self.commanded: MountState | None = None
         self.stepped = -math.inf
+        self.late: MountState | None = None  # where a follower that does not look ahead would be
         self.counts = {"sent": 0, "refused": 0, "connects": 0, "lost": 0}
 
-    def follow(self, azimuth: float, elevation: float, now: float) -> MountState | None:
-        """Go on towards a direction (rad); returns the position last commanded, None while there is no rotator."""
+    def follow(self, azimuth: float, elevation: float, now: float, path: Path | None = None) -> MountState | None:
+        """Go on towards a direction (rad); returns the position last commanded, None while there is no rotator.
+
+        `path` tells the directions from now on, `SPACING` apart, when a command is due: so that azimuth begins to turn
+        in time for what it cannot follow, a pass near the zenith.
+        """
         if not self._connected(now):
             return None
         self._listen(now)
@@ -49,7 +59,7 @@ class Rotator:
             return self.commanded
         here = self.commanded or self.mount.reach(self.position.azimuth, self.position.elevation, self.position.azimuth)
         dt = min(now - self.stepped, 5.0) if math.isfinite(self.stepped) else self.period
-        goal = self.mount.step(here, azimuth, elevation, dt)
+        goal = self._goal(here, azimuth, elevation, dt, path)
         self.stepped = now
         self._ask(now)  # first: Hamlib's dummy forgets what it has slewed when a new goal comes unasked
         moved = max(abs(goal.azimuth - here.azimuth), abs(goal.elevation - here.elevation))
@@ -58,6 +68,14 @@ class Rotator:
             self._send(f"P {math.degrees(goal.azimuth):.4f} {math.degrees(goal.elevation):.4f}\n", "P")
             self.counts["sent"] += 1
         return self.commanded
+
+    def _goal(self, here: MountState, azimuth: float, elevation: float, dt: float, path: Path | None) -> MountState:
+        told = path() if path is not None else None
+        if told is None:
+            self.late = None
+            return self.mount.step(here, azimuth, elevation, dt)
+        self.late, aim = self.mount.foresee(self.late or here, *told, SPACING, dt)
+        return self.mount.step(here, aim.azimuth, aim.elevation, dt)
 
     def close(self) -> None:
         """Hang up."""
@@ -88,7 +106,7 @@ class Rotator:
                 self._drop()
             return False
         self.ready, self.heard, self.buffer, self.waiting = True, now, b"", []
-        self.position = self.commanded = None
+        self.position = self.commanded = self.late = None
         self.stepped = self.sent_at = -math.inf
         self.counts["connects"] += 1
         return True
