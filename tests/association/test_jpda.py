@@ -120,6 +120,38 @@ def test_a_long_chain_is_exact_and_ends_with_the_same_as_its_parts() -> None:
     np.testing.assert_allclose(jpda.marginals(weight[permuted], miss[permuted]).p, whole.p[permuted], atol=1e-11)
 
 
+def test_clusters_of_every_shape_do_not_depend_on_the_order() -> None:
+    """Tracks and clutter in a square: reports open and close in any order, from either side."""
+    rng = np.random.default_rng(11)
+    for _ in range(60):
+        n, m = rng.integers(5, 25, 2)
+        x, z = rng.uniform(0.0, 10.0, (n, 2)), rng.uniform(0.0, 10.0, (m, 2))
+        d2 = ((z[None] - x[:, None]) ** 2).sum(axis=2)
+        weight, miss = np.where(d2 < 6.0, np.exp(-0.5 * d2), 0.0), rng.uniform(0.05, 1.0, n)
+        found = jpda.marginals(weight, miss, most_states=3e6)
+        rows, columns = rng.permutation(n), rng.permutation(m)
+        other = jpda.marginals(weight[np.ix_(rows, columns)], miss[rows], most_states=3e6)
+        np.testing.assert_allclose(other.p, found.p[np.ix_(rows, columns)], atol=1e-11 if found.exact.all() else 1e-6)
+        turned = jpda.marginals((weight / miss[:, None]).T, np.ones(m), most_states=3e6)
+        assert (turned.exact.all()) == (found.exact.all())
+        np.testing.assert_allclose(turned.p.T, found.p, atol=1e-11 if found.exact.all() else 1e-6)
+
+
+def test_many_reports_of_one_track_alone_cost_nothing() -> None:
+    """A hundred reports in one gate, three of them shared: as if the others were one."""
+    rng = np.random.default_rng(12)
+    weight, miss = np.zeros((2, 100)), np.array([0.2, 0.3])
+    weight[0], weight[1, :3] = rng.uniform(0.1, 1.0, 100), rng.uniform(0.1, 1.0, 3)
+    found = jpda.marginals(weight, miss, most_states=100.0)
+    assert found.exact.all()
+    few = np.zeros((2, 4))
+    few[:, :3], few[0, 3] = weight[:, :3], weight[0, 3:].sum()
+    p, alone = enumerate_all(few, miss)
+    np.testing.assert_allclose(found.p[:, :3], p[:, :3], atol=1e-12)
+    np.testing.assert_allclose(found.p[0, 3:], p[0, 3] * weight[0, 3:] / few[0, 3], atol=1e-12)
+    np.testing.assert_allclose(found.p_miss, alone, atol=1e-12)
+
+
 def test_messages_are_exact_where_there_is_no_cycle() -> None:
     rng = np.random.default_rng(6)
     n = 30

@@ -13,7 +13,7 @@ from boresight.kernels import jpda as kernel
 from boresight.kernels.gate import gate_grid
 from boresight.types.sensor import FloatArray
 
-MOST_STATES = 300_000.0  # of one cluster that is worked out exactly: 14 tracks that all see 14 reports need 213,000
+MOST_STATES = 300_000.0  # of one cluster that is worked out exactly: 14 tracks that all see 14 reports need 229,000
 
 
 class Marginals(NamedTuple):
