@@ -97,9 +97,10 @@ def test_a_hundred_thousand_mutants() -> None:
     for m in (SHIP, GOOD, PLACE, TRACK):  # compile first: that takes memory of its own
         for report in feed().parse(json.dumps(m).encode(), 1000.0):
             POINTER.take(POINTER.init(), *report)
-    tracemalloc.start()
-    base = tracemalloc.get_traced_memory()[0]
     for i in range(100_000):
+        if i == 80_000:  # tracing is slow: what leaks, leaks at the end too
+            tracemalloc.start()
+            base = tracemalloc.get_traced_memory()[0]
         data = bytearray(seeds[which[i]])
         if data and kinds[i] < 3:
             for k in range(kinds[i] + 1):
@@ -119,4 +120,4 @@ def test_a_hundred_thousand_mutants() -> None:
     tracemalloc.stop()
     assert taken > 300
     assert sum(f.counts.values()) > 50_000
-    assert grown < 2e6
+    assert grown < 5e5
