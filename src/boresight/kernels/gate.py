@@ -40,6 +40,12 @@ def cells(z: FloatArray, size: float, low: FloatArray, shape: IntArray) -> tuple
 
 
 @njit(cache=True)
+def place(at: float, low: float, size: float, cells: int) -> int:
+    """Return the cell of a coordinate, that of the border for one beyond it."""
+    return int(max(0.0, min((at - low) / size, cells - 1.0)))
+
+
+@njit(cache=True)
 def distance2(x: FloatArray, L: FloatArray, z: FloatArray, w: FloatArray) -> float:
     """Return |L⁻¹(z - x)|²; `w` (d,) is scratch."""
     total = 0.0
@@ -100,14 +106,14 @@ def gate_grid(
         log_det = 0.0
         for a in range(d):
             log_det += 2.0 * math.log(L[a, a])
-        first, last = np.empty(2, np.int64), np.empty(2, np.int64)
-        for a in range(2):
-            box = reach * math.sqrt(S[i, a, a])
-            first[a] = int(max(0.0, min((x[i, a] - box - low[a]) / size, float(shape[a]))))
-            last[a] = int(max(-1.0, min(math.floor((x[i, a] + box - low[a]) / size), shape[a] - 1.0)))
-        for row in range(first[0], last[0] + 1):
-            for k in range(begin[row * shape[1] + first[1]], begin[row * shape[1] + max(first[1], last[1] + 1)]):
+        wide, tall = reach * math.sqrt(S[i, 0, 0]), reach * math.sqrt(S[i, 1, 1])
+        west, east = place(x[i, 0] - wide, low[0], size, shape[0]), place(x[i, 0] + wide, low[0], size, shape[0])
+        south, north = place(x[i, 1] - tall, low[1], size, shape[1]), place(x[i, 1] + tall, low[1], size, shape[1])
+        for line in range(west, east + 1):
+            for k in range(begin[line * shape[1] + south], begin[line * shape[1] + north + 1]):
                 j = order[k]
+                if abs(z[j, 0] - x[i, 0]) > wide or abs(z[j, 1] - x[i, 1]) > tall:
+                    continue
                 value = distance2(x[i], L, z[j], w)
                 price = 0.5 * (value + log_det) - gain
                 if value < gate and price < 0.0:
