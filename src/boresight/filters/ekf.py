@@ -20,7 +20,8 @@ from boresight.models.protocols import MeasurementModel, MotionModel
 from boresight.types.sensor import FloatArray
 from boresight.types.state import GaussianState, UpdateInfo
 
-SIX = (6, 6)
+MOVED = (7, 6)
+new = tuple.__new__  # of a named tuple, without the detour through its own
 NOTHING = "the measurement has no component that can be used: nothing measured, or zero range"
 
 
@@ -44,10 +45,10 @@ def predict(state: GaussianState, motion: MotionModel, t: float) -> GaussianStat
     if not 0.0 <= dt < math.inf:
         raise UserError(f"cannot predict from t = {state.t!r} to t = {t!r}: time must not run backwards")
     if type(motion) is NearlyConstantVelocity and motion.dimensions == 3:
-        x, P = empty(6), empty(SIX)
+        out = empty(MOVED)
         try:
-            if predict_space(state.x, state.P, dt, motion.q, x, P):
-                return GaussianState(float(t), x, P)
+            if predict_space(state.x, state.P, dt, motion.q, out):
+                return new(GaussianState, (float(t), out[6], out[:6]))
         except TypeError:  # not contiguous float64: the way for all
             pass
     if isinstance(motion, KernelMotion) and motion.kernel is move and len(state.x) == motion.state_dimension:
@@ -74,18 +75,16 @@ def update(
     Raises UserError where the report holds no component that can be used, or S is not positive definite.
     """
     if n_estimated is None and isinstance(sensor, KernelSensor) and sensor.separable:  # the straight-line kernel
-        columns = sensor.columns_measured
-        m = len(columns)
-        x, P, y, S = empty(6), empty(SIX), empty(m), empty((m, m))
+        m = len(sensor.components)
+        out = empty((8 + m, 6))  # P, the mean, y, S: one array is quicker made, and handed over, than four
         try:
-            used, nis, log_likelihood = update_space(state.x, state.P, z, columns, sensor.context, x, P, y, S)
+            used, nis, log_likelihood = update_space(state.x, state.P, z, sensor.context, out)
         except TypeError:  # not contiguous float64: the way for all
             used = MISFIT
         if used > 0 and nis == nis:
-            if used < m:
-                m = int(used)
-                y, S = y[:m], S[:m, :m].copy()
-            return GaussianState(state.t, x, P), UpdateInfo(y, S, nis, log_likelihood)
+            m = int(used)
+            info = new(UpdateInfo, (out[7, :m], out[8 : 8 + m, :m], nis, log_likelihood))
+            return new(GaussianState, (state.t, out[6], out[:6])), info
     n = len(state.x) if n_estimated is None else n_estimated
     if isinstance(sensor, KernelSensor):
         x, P, y, S, nis, log_likelihood = update_step(state.x, state.P, sensor.columns(z), sensor.context, n)

@@ -14,7 +14,7 @@ from numba import njit, types
 
 from boresight.kernels.arctan import FAST, INLINE, near
 from boresight.kernels.blocks import Belief, Nine, Six, Three, condition_rate, dot, move, spread
-from boresight.kernels.observation import NOISE, POSITION, ROTATION, VELOCITY, IntArray
+from boresight.kernels.observation import NOISE, POSITION, ROTATION, VELOCITY
 from boresight.kernels.sight import polar, range_rate, turned_polar
 from boresight.kernels.signatures import MATRIX, VECTOR
 from boresight.types.sensor import FloatArray
@@ -48,9 +48,9 @@ def store_dense(x: FloatArray, P: FloatArray, p: Three, v: Three, A: Six, B: Nin
             P[i, 3 + j] = P[3 + j, i] = B[3 * i + j]
 
 
-@njit(types.boolean(VECTOR, MATRIX, types.float64, types.float64, VECTOR, MATRIX), **FAST)
-def predict_space(x: FloatArray, P: FloatArray, dt: float, q: float, x_out: FloatArray, P_out: FloatArray) -> bool:
-    """Fill the mean (6,) and covariance (6, 6) moved by `dt` (s) at nearly constant velocity, q in m²/s³.
+@njit(types.boolean(VECTOR, MATRIX, types.float64, types.float64, MATRIX), **FAST)
+def predict_space(x: FloatArray, P: FloatArray, dt: float, q: float, out: FloatArray) -> bool:
+    """Move by `dt` (s) at nearly constant velocity, q in m²/s³: `out` (7, 6) is filled with P (6, 6), then the mean.
 
     Returns False, with nothing done, where x or P have another size.
     """
@@ -58,13 +58,13 @@ def predict_space(x: FloatArray, P: FloatArray, dt: float, q: float, x_out: Floa
         return False
     p, v, A, B, C = load_dense(x, P)
     p, v, A, B, C = move(p, v, A, B, C, dt, q)
-    store_dense(x_out, P_out, p, v, A, B, C)
+    store_dense(out[6], out, p, v, A, B, C)
     return True
 
 
 @njit(**FAST)
-def slopes(p: Three, v: Three, z: FloatArray, columns: IntArray, c: FloatArray, y: FloatArray, H: FloatArray) -> int:
-    """Fill innovations and slopes, and the noise variance last: `H` (m, 7), of the components that can be used."""
+def slopes(p: Three, v: Three, z: FloatArray, c: FloatArray, H: FloatArray) -> int:
+    """Fill rows of `H` (m, 8), of the components that can be used: slope (6,), noise variance, innovation."""
     d = (p[0] - c[POSITION], p[1] - c[POSITION + 1], p[2] - c[POSITION + 2])
     u = (v[0] - c[VELOCITY], v[1] - c[VELOCITY + 1], v[2] - c[VELOCITY + 2])
     e = ROTATION
@@ -73,26 +73,28 @@ def slopes(p: Three, v: Three, z: FloatArray, columns: IntArray, c: FloatArray, 
         r, azimuth, elevation, h_r, h_a, h_e = polar(d)
     else:
         r, azimuth, elevation, h_r, h_a, h_e = turned_polar(R, d)
-    m = 0
-    for i in range(z.shape[0]):
+    m, i = 0, -1
+    for column in range(7):
+        if not c[NOISE + 8 * column] > 0.0:
+            continue
+        i += 1
         g = (0.0, 0.0, 0.0)
-        if columns[i] == 0:
+        if column == 0:
             h, error = h_r, z[i] - r
-        elif columns[i] == 1:
+        elif column == 1:
             h, error = h_a, near(z[i] - azimuth)
-        elif columns[i] == 2:
+        elif column == 2:
             h, error = h_e, near(z[i] - elevation)
-        elif columns[i] == 3:
+        elif column == 3:
             rate, h, g = range_rate(d, u)
             error = z[i] - rate
         else:
-            a = columns[i] - 4
+            a = column - 4
             h = (c[e + a], c[e + 3 + a], c[e + 6 + a])
             error = z[i] - dot(h, d)
         if not math.isnan(error):
-            y[m] = error
             H[m, 0], H[m, 1], H[m, 2], H[m, 3], H[m, 4], H[m, 5] = h[0], h[1], h[2], g[0], g[1], g[2]
-            H[m, 6] = c[NOISE + 8 * columns[i]]
+            H[m, 6], H[m, 7] = c[NOISE + 8 * column], error
             m += 1
     return m
 
@@ -100,45 +102,37 @@ def slopes(p: Three, v: Three, z: FloatArray, columns: IntArray, c: FloatArray, 
 THREE_NUMBERS = types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
 
 
-@njit(
-    THREE_NUMBERS(VECTOR, MATRIX, VECTOR, types.int64[::1], VECTOR, VECTOR, MATRIX, VECTOR, MATRIX),
-    **FAST,
-)
+@njit(THREE_NUMBERS(VECTOR, MATRIX, VECTOR, VECTOR, MATRIX), **FAST)
 def update_space(
-    x: FloatArray,
-    P: FloatArray,
-    z: FloatArray,
-    columns: IntArray,
-    context: FloatArray,
-    x_out: FloatArray,
-    P_out: FloatArray,
-    y: FloatArray,
-    S: FloatArray,
+    x: FloatArray, P: FloatArray, z: FloatArray, context: FloatArray, out: FloatArray
 ) -> tuple[float, float, float]:
-    """Condition on `z` (m,), whose components are `columns` (m,); fills mean, covariance, y (m,) and S (m, m).
+    """Condition on `z` (m,), the components with noise in `context`, in order.
 
-    Returns how many components were used (the first so many of y and S are filled; MISFIT where sizes do not fit), the
-    normalised innovation squared (NaN where S is not positive definite) and log N(y; 0, S).
+    `out` (8 + m, 6), m ≤ 6, is filled with the covariance (6, 6), the mean, y (m,) and S (m, m); caller and context
+    must agree on m. Returns how many components were used (the first so many of y and S are filled; MISFIT where sizes
+    do not fit), the normalised innovation squared (NaN where S is not positive definite) and log N(y; 0, S).
     """
-    if z.shape[0] != columns.shape[0] or x.shape[0] != 6 or P.shape[0] != 6 or P.shape[1] != 6:
+    size = z.shape[0]
+    if out.shape[0] != 8 + size or size > 6 or x.shape[0] != 6 or P.shape[0] != 6 or P.shape[1] != 6:
         return MISFIT, 0.0, 0.0
-    H = np.empty((columns.shape[0], 7))
+    H = np.empty((size, 8))
     p, v, A, B, C = load_dense(x, P)
-    m = slopes(p, v, z, columns, context, y, H)
+    m = slopes(p, v, z, context, H)
     for i in range(m):
+        out[7, i] = H[i, 7]
         h, g = (H[i, 0], H[i, 1], H[i, 2]), (H[i, 3], H[i, 4], H[i, 5])
         a, b = spread(A, B, C, h, g)
         for j in range(i + 1):
-            S[i, j] = S[j, i] = (
+            out[8 + i, j] = out[8 + j, i] = (
                 H[j, 0] * a[0] + H[j, 1] * a[1] + H[j, 2] * a[2] + H[j, 3] * b[0] + H[j, 4] * b[1] + H[j, 5] * b[2]
             )
-        S[i, i] += H[i, 6]
+        out[8 + i, i] += H[i, 6]
     nis, det = 0.0, 1.0
     here, speed = p, v
     for i in range(m):
         h, g = (H[i, 0], H[i, 1], H[i, 2]), (H[i, 3], H[i, 4], H[i, 5])
-        p, v, A, B, C, part, s = condition_rate(p, v, A, B, C, here, speed, h, g, y[i], H[i, 6])
+        p, v, A, B, C, part, s = condition_rate(p, v, A, B, C, here, speed, h, g, H[i, 7], H[i, 6])
         nis += part
         det *= s
-    store_dense(x_out, P_out, p, v, A, B, C)
+    store_dense(out[6], out, p, v, A, B, C)
     return m, nis, -0.5 * (nis + math.log(det) + m * math.log(2.0 * math.pi))

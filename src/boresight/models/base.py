@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from boresight.errors import UserError
 from boresight.kernels import observation
@@ -34,7 +33,6 @@ class KernelSensor:
     """
 
     components: tuple[Component, ...]  # measured, ascending: the order of every measurement
-    columns_measured: NDArray[np.int64]  # (m,) the same as an array
     context: FloatArray  # (66,) what the kernel wants to know
     separable: bool  # components can be taken one at a time: in space, noise not correlated, not the tangent form
     kernel = staticmethod(observation.observe)
@@ -135,7 +133,6 @@ def describe(
     context[observation.TANGENT] = tangent
     context[observation.POSITION : observation.NOISE] = _place(sensor.pose)
     object.__setattr__(sensor, "components", components)
-    object.__setattr__(sensor, "columns_measured", index.astype(np.int64))
     object.__setattr__(sensor, "context", context)
     alone = not tangent and dimensions == 3 and np.count_nonzero(noise) == len(components)
     object.__setattr__(sensor, "separable", alone)
