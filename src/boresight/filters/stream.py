@@ -9,9 +9,12 @@ import numpy as np
 
 from boresight.errors import UserError
 from boresight.kernels import smoothing
+from boresight.kernels.observation import observe
+from boresight.kernels.packed import UNFIT, space_stream
 from boresight.kernels.stream import ekf_stream
 from boresight.models.base import KernelSensor
 from boresight.models.motion.base import KernelMotion
+from boresight.models.motion.cv import NearlyConstantVelocity
 from boresight.types.sensor import FloatArray
 from boresight.types.state import GaussianState
 
@@ -66,11 +69,15 @@ def run(state: GaussianState, motion: KernelMotion, reports: Reports, iterations
     """
     k, n = len(reports.t), motion.state_dimension
     x, P, xp, Pp, F = np.empty((k, n)), np.empty((k, n, n)), np.empty((k, n)), np.empty((k, n, n)), np.empty((k, n, n))
-    nis = np.zeros((k, 2))
-    done = ekf_stream(
-        motion.kernel, motion.parameters, reports.observe, state.x, state.P, state.t, *reports[:3], iterations,
-        x, P, xp, Pp, F, nis,
-    )  # fmt: skip
+    nis, done = np.zeros((k, 2)), UNFIT
+    in_space = type(motion) is NearlyConstantVelocity and motion.dimensions == 3 and state.x.shape == (6,)
+    if in_space and iterations == 1 and reports.observe is observe:
+        done = space_stream(motion.q, state.x, state.P, state.t, *reports[:3], x, P, xp, Pp, F, nis)  # type: ignore[attr-defined]
+    if done == UNFIT:
+        done = ekf_stream(
+            motion.kernel, motion.parameters, reports.observe, state.x, state.P, state.t, *reports[:3], iterations,
+            x, P, xp, Pp, F, nis,
+        )  # fmt: skip
     require_all(done, reports)
     return Filtered(reports.t, x, P, xp, Pp, F, nis[:, 0].copy(), nis[:, 1].copy())
 

@@ -15,29 +15,43 @@ from numba import njit, types
 
 from boresight.kernels.arctan import FAST, INLINE, near
 from boresight.kernels.blocks import Nine, Six, Three, condition, condition_rate, load, move, store
-from boresight.kernels.observation import CONTEXT_SIZE, NOISE, POSITION, ROTATION, VELOCITY, IntArray
+from boresight.kernels.observation import (
+    CONTEXT_SIZE,
+    DIMENSIONS,
+    NOISE,
+    POSITION,
+    ROTATION,
+    TANGENT,
+    VELOCITY,
+    IntArray,
+)
 from boresight.kernels.sight import polar, range_rate, turned_polar
-from boresight.kernels.signatures import MATRIX, VECTOR
+from boresight.kernels.signatures import MATRIX, STACK, VECTOR
+from boresight.kernels.space import load_dense, store_dense
 from boresight.types.sensor import FloatArray
 
-Conditioned = tuple[Three, Three, Six, Nine, Six, float]
+Conditioned = tuple[Three, Three, Six, Nine, Six, float, int]
 
 TIME, POWER, NUMBERS = 0, 1, 2  # of a belief
 BELIEF_SIZE = NUMBERS + 27
 MEASURED, CONTEXT = 1, 8  # of a report
 REPORT_SIZE = CONTEXT + CONTEXT_SIZE
+UNFIT = -1  # what `space_stream` returns for a sensor that it cannot take
 BACKWARDS = -1.0  # what `packed_step` returns where the report is before the belief: NIS cannot be negative
 
 
 @njit(**INLINE)
 def look(p: Three, v: Three, A: Six, B: Nine, C: Six, z: FloatArray, k: int, c: FloatArray, o: int) -> Conditioned:
-    """Condition on the report `z[k:k + 7]`, NaN where not measured, of the sensor with context `c[o:o + 66]`."""
+    """Condition on the report `z[k:k + 7]`, NaN where not measured, of the sensor with context `c[o:o + 66]`.
+
+    Returns the belief, the normalised innovation squared and how many components were used.
+    """
     here, speed = p, v
     d = (p[0] - c[o + POSITION], p[1] - c[o + POSITION + 1], p[2] - c[o + POSITION + 2])
     e = o + ROTATION
     R = (c[e], c[e + 1], c[e + 2], c[e + 3], c[e + 4], c[e + 5], c[e + 6], c[e + 7], c[e + 8])
     n = o + NOISE
-    total = 0.0
+    total, used = 0.0, 0
     if R[0] + R[4] + R[8] == 3.0:  # not turned: no other rotation has this trace
         r, azimuth, elevation, h_r, h_a, h_e = polar(d)
     else:
@@ -45,24 +59,29 @@ def look(p: Three, v: Three, A: Six, B: Nine, C: Six, z: FloatArray, k: int, c: 
     if not math.isnan(z[k]):
         p, v, A, B, C, nis, _ = condition(p, v, A, B, C, here, h_r, z[k] - r, c[n])
         total += nis
+        used += 1 if r == r else 0
     if not math.isnan(z[k + 1]):
         p, v, A, B, C, nis, _ = condition(p, v, A, B, C, here, h_a, near(z[k + 1] - azimuth), c[n + 8])
         total += nis
+        used += 1 if azimuth == azimuth else 0
     if not math.isnan(z[k + 2]):
         p, v, A, B, C, nis, _ = condition(p, v, A, B, C, here, h_e, near(z[k + 2] - elevation), c[n + 16])
         total += nis
+        used += 1 if elevation == elevation else 0
     if not math.isnan(z[k + 3]):
         u = (speed[0] - c[o + VELOCITY], speed[1] - c[o + VELOCITY + 1], speed[2] - c[o + VELOCITY + 2])
         rate, h, g = range_rate(d, u)
         p, v, A, B, C, nis, _ = condition_rate(p, v, A, B, C, here, speed, h, g, z[k + 3] - rate, c[n + 24])
         total += nis
+        used += 1 if rate == rate else 0
     for a in range(3):
         if not math.isnan(z[k + 4 + a]):
             h = (c[e + a], c[e + 3 + a], c[e + 6 + a])
             seen = h[0] * d[0] + h[1] * d[1] + h[2] * d[2]
             p, v, A, B, C, nis, _ = condition(p, v, A, B, C, here, h, z[k + 4 + a] - seen, c[n + 32 + 8 * a])
             total += nis
-    return p, v, A, B, C, total
+            used += 1
+    return p, v, A, B, C, total, used
 
 
 @njit(types.float64(VECTOR, VECTOR), **FAST)
@@ -77,7 +96,7 @@ def packed_step(belief: FloatArray, report: FloatArray) -> float:
         return BACKWARDS
     p, v, A, B, C = load(belief, NUMBERS, 1)
     p, v, A, B, C = move(p, v, A, B, C, dt, belief[POWER])
-    p, v, A, B, C, nis = look(p, v, A, B, C, report, MEASURED, report, CONTEXT)
+    p, v, A, B, C, nis, _ = look(p, v, A, B, C, report, MEASURED, report, CONTEXT)
     store(belief, NUMBERS, 1, p, v, A, B, C)
     belief[TIME] = report[TIME]
     return float(nis)
@@ -114,7 +133,7 @@ def packed_stream(
             break
         p, v, A, B, C = move(p, v, A, B, C, dt, q)
         now = t[k]
-        p, v, A, B, C, value = look(p, v, A, B, C, flat_z, 7 * k, flat_c, sensor[k] * width)
+        p, v, A, B, C, value, _ = look(p, v, A, B, C, flat_z, 7 * k, flat_c, sensor[k] * width)
         if math.isnan(value):
             break
         if kept.shape[0] > 0:
@@ -125,3 +144,65 @@ def packed_stream(
     store(belief, NUMBERS, 1, p, v, A, B, C)
     belief[TIME] = now
     return done
+
+
+@njit(**INLINE)
+def separable(c: FloatArray, o: int) -> bool:
+    """Return whether `look` can take the context at `c[o:]`: in space, not tangent, noise not correlated."""
+    apart = c[o + DIMENSIONS] == 3.0 and c[o + TANGENT] == 0.0
+    for i in range(7):
+        for j in range(i):
+            apart = apart and c[o + NOISE + 7 * i + j] == 0.0
+    return bool(apart)
+
+
+@njit(
+    types.int64(
+        types.float64, VECTOR, MATRIX, types.float64, VECTOR, MATRIX, MATRIX,
+        MATRIX, STACK, MATRIX, STACK, STACK, MATRIX,
+    ),
+    nogil=True,
+    **FAST,
+)  # fmt: skip
+def space_stream(
+    q: float,
+    x0: FloatArray,
+    P0: FloatArray,
+    t0: float,
+    t: FloatArray,
+    z: FloatArray,
+    context: FloatArray,
+    x_out: FloatArray,
+    P_out: FloatArray,
+    x_predicted: FloatArray,
+    P_predicted: FloatArray,
+    F_out: FloatArray,
+    nis: FloatArray,
+) -> int:
+    """`stream.ekf_stream` for nearly constant velocity in space: everything kept, by the algebra of `blocks`.
+
+    Returns the reports done; UNFIT where a report's context is not `separable`, and then another kernel has to do it.
+    """
+    p, v, A, B, C = load_dense(x0, P0)
+    now = t0
+    flat_z, flat_c, width = z.reshape(-1), context.reshape(-1), context.shape[1]
+    for k in range(t.shape[0]):
+        dt = t[k] - now
+        if not separable(flat_c, k * width):
+            return UNFIT
+        if not dt >= 0.0:
+            return k
+        now = t[k]
+        for i in range(6):
+            for j in range(6):
+                F_out[k, i, j] = 1.0 if i == j else 0.0
+        for i in range(3):
+            F_out[k, i, 3 + i] = dt
+        p, v, A, B, C = move(p, v, A, B, C, dt, q)
+        store_dense(x_predicted[k], P_predicted[k], p, v, A, B, C)
+        p, v, A, B, C, value, used = look(p, v, A, B, C, flat_z, 7 * k, flat_c, k * width)
+        if math.isnan(value):
+            return k
+        nis[k, 0], nis[k, 1] = value, used
+        store_dense(x_out[k], P_out[k], p, v, A, B, C)
+    return len(t)
