@@ -106,6 +106,21 @@ print(repr(float(belief[2])), found.detection.tolist())
     assert said[0].stdout.split()[1:] == said[1].stdout.split()[1:]
 
 
+def test_own_kernels_without_the_compiler_say_so_in_one_line() -> None:
+    code = """
+from boresight.errors import UserError
+from boresight.filters import own
+from boresight.models import NearlyConstantVelocity, Radar
+try:
+    own.models(NearlyConstantVelocity(1.0), Radar(1.0))
+except UserError as error:
+    print(error)
+"""
+    env = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env, check=True)
+    assert "take filters.ekf or stream" in done.stdout
+
+
 @pytest.mark.skipif(shutil.which("taskset") is None, reason="taskset is not there to give one core only")
 def test_on_one_core() -> None:
     assert_same(told({}, prefix=("taskset", "-c", "0")))

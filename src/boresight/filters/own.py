@@ -13,6 +13,7 @@ import numpy as np
 
 from boresight.errors import UserError
 from boresight.filters.packed import Table
+from boresight.kernels import config
 from boresight.kernels.address import address_of
 from boresight.kernels.own import CONTEXT, COVARIANCE, MEAN, MEASURED, PARAMETERS, TIME, N, own_stream
 from boresight.kernels.own import own_step as step
@@ -40,6 +41,8 @@ def models(motion: KernelMotion, sensor: KernelSensor | OwnSensor) -> Models:
     """Return the addresses of a motion model's and a sensor's kernel; raises UserError for other than six states."""
     if motion.state_dimension != N:
         raise UserError(f"this filter is for {N} states, not {motion.state_dimension}: take filters.stream")
+    if config.DISABLE_JIT:
+        raise UserError("kernels have no address with NUMBA_DISABLE_JIT=1: unset it, or take filters.ekf or stream")
     return Models(
         address_of(motion.kernel, MOTION), address_of(sensor.kernel, OBSERVATION), (motion.kernel, sensor.kernel)
     )
