@@ -24,6 +24,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "import": ("boresight.cli.import_:app", "Turn other formats into a recording."),
     "simulate": ("boresight.cli.simulate:simulate", "Turn a scenario into a recording with truth."),
     "track": ("boresight.cli.track:track", "Track the targets of a recording."),
+    "register": (
+        "boresight.cli.register:register",
+        "Find sensors' time offsets and biases from targets of opportunity.",
+    ),
     "tune": ("boresight.cli.tune:tune", "Find process and measurement noise from a recording's innovations."),
     "score": ("boresight.cli.score:score_command", "Score tracks against the truth of their recording."),
     "compare": ("boresight.cli.compare:compare", "Run several configurations on one recording, side by side."),

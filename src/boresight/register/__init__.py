@@ -1,0 +1,1 @@
+"""Constant errors of sensors from targets of opportunity, off line."""
