@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.registration import CONFIG, case
 from benchmarks.scoreboard import DATA, configuration, recordings
 from boresight._version import __version__
-from boresight.cli.register import DEFAULT_Q, PRIOR, fit, rows_of
+from boresight.cli.register import DEFAULT_Q, EXTENT, PRIOR, fit, rows_of
 from boresight.register.batch import BatchConfig, Coloured, estimate
 from boresight.register.observe import observed_of
 from boresight.register.residuals import Observed
@@ -101,7 +101,7 @@ def with_truth(recording: Recording, settings: TrackerConfig) -> dict[str, tuple
         e = settings.sensors.get(one.id, SensorErrors())
         wander = np.array([e.bias_range, e.bias_azimuth, e.bias_elevation, 0.0, *[e.bias_position] * 3])
         coloured[i] = Coloured(wander, e.bias_time)
-    batch = BatchConfig(settings.q or DEFAULT_Q[2], np.array(PRIOR), coloured)
+    batch = BatchConfig(settings.q or DEFAULT_Q[2], np.array(PRIOR), coloured, extent=EXTENT)
     got = estimate(observed, sensors, batch, true, True)
     return {
         sensors[int(got.sensor[k])].id: (float(got.value[k]), math.sqrt(got.covariance[k, k]))

@@ -53,7 +53,8 @@ class BatchConfig:
     coloured: Mapping[int, Coloured] = field(default_factory=dict)
     robust: float = 3.0  # whitened residuals beyond this (times √components) count less
     speed_sigma: float = 200.0  # m/s
-    iterations: int = 40
+    extent: float = 0.0  # m: a target's half length, which directions to it may be off by
+    iterations: int = 60
     tolerance: float = 0.03  # of a standard deviation: when to stop
 
 
@@ -116,8 +117,8 @@ def estimate(
         system = _system(observed, sensors, config, pairs, value, errors, paths, layout, slow, scale)
         dx, dv, covariance = _solve(system)
         sigma = np.sqrt(np.diag(covariance))
-        if float((dv / sigma) @ last) < 0.0:  # weights that come and go with the step make it swing
-            damping *= 0.6
+        swings = float((dv / sigma) @ last) < 0.0  # weights that come and go with the step make it swing
+        damping = max(0.5 * damping, 0.2) if swings else min(1.2 * damping, 1.0)
         last = dv / sigma
         settled = bool((np.abs(dv) <= config.tolerance * sigma).all())
         dv, dx = _shortened(damping * dv, damping * dx, 0.5 * prior)
@@ -209,7 +210,16 @@ def _system(
 ) -> _System:
     rows = _Rows()
     lines = linearise(
-        observed, paths, errors, sensors, layout.channels, layout.first_coloured, slow, config.robust, scale
+        observed,
+        paths,
+        errors,
+        sensors,
+        layout.channels,
+        layout.first_coloured,
+        slow,
+        config.robust,
+        scale,
+        config.extent,
     )
     T = np.zeros((lines.lines, len(pairs)))
     for i, (sensor, parameter) in enumerate(pairs):
@@ -315,6 +325,7 @@ def _inflated(system: _System, covariance: FloatArray) -> FloatArray:
     _, group = np.unique(system.cluster, return_inverse=True)
     scores = np.zeros((int(group.max()) + 1, U.shape[1]))
     np.add.at(scores, group, U * system.r[:, None])
-    sandwich = covariance @ (scores.T @ scores) @ covariance
+    few = len(scores) / max(len(scores) - 1.0, 1.0)
+    sandwich = few * covariance @ (scores.T @ scores) @ covariance
     root = np.sqrt(np.maximum(1.0, np.diag(sandwich) / np.diag(covariance)))
     return np.asarray(np.minimum(root, 1e6)[:, None] * covariance * np.minimum(root, 1e6))

@@ -16,7 +16,7 @@ from boresight.types import N_COMPONENTS, Component, FloatArray, Sensor
 
 ANGLES = (Component.AZIMUTH, Component.ELEVATION)
 DELTA = 0.05  # s, of the time derivative
-STRETCH = 20.0  # s
+STRETCH = 40.0  # s
 
 
 class Observed(NamedTuple):
@@ -70,10 +70,12 @@ def linearise(
     slow: FloatArray,
     robust: float,
     scale: FloatArray,
+    extent: float,
 ) -> Lines:
     """Linearise every report about `paths` and `errors` (sensors, 5), the coloured errors at `slow`.
 
-    `scale` (sensors,) multiplies the declared variances; residuals beyond `robust` count less (Cauchy's weights).
+    `scale` (sensors,) multiplies the declared variances; residuals beyond `robust` count less (Cauchy's
+    weights); a direction may be that of any point within `extent` (m) of the target's middle.
     """
     d = paths[0].x.shape[1] // 2
     parts: list[Lines] = []
@@ -84,7 +86,7 @@ def linearise(
             part = _group(observed, rows, path, errors[s], sensors[int(s)], d)
             wide = scale[s] * observed.alike[rows]
             cluster = cluster_of(k, observed.t[rows])
-            lines = _lines(part, k, int(s), count, channels, first_coloured, slow, robust, wide, cluster)
+            lines = _lines(part, k, int(s), count, channels, first_coloured, slow, robust, wide, cluster, extent)
             parts.append(lines)
             count += lines.lines
     joined = {
@@ -105,6 +107,7 @@ class _Group(NamedTuple):
     mask: list[int]  # components
     knot: NDArray[np.int64]  # (n,)
     share: FloatArray  # (n,) of the way to the next knot
+    far: FloatArray  # (n,) m, predicted range
 
 
 def _group(
@@ -125,7 +128,17 @@ def _group(
     state[:, :, d:] = H[:, :, 3 : 3 + d] + dt[:, None, None] * H[:, :, :d]
     R = observed.R[rows][:, mask][:, :, mask]
     from_knot = dt / (path.t[1] - path.t[0])
-    return _Group(observed.z[rows][:, mask], z[:, mask], state[:, mask], S[:, mask], R, mask, knot, from_knot)
+    return _Group(
+        observed.z[rows][:, mask],
+        z[:, mask],
+        state[:, mask],
+        S[:, mask],
+        R,
+        mask,
+        knot,
+        from_knot,
+        z[:, Component.RANGE],
+    )
 
 
 def _predict(
@@ -157,6 +170,7 @@ def _lines(
     robust: float,
     wide: FloatArray,
     cluster: NDArray[np.int64],
+    extent: float,
 ) -> Lines:
     n, m = g.z.shape
     y = g.z - g.predicted
@@ -169,6 +183,8 @@ def _lines(
     # a report without a component has it left out: infinite variance
     missing = ~np.isfinite(g.z)
     R = np.where(missing[:, :, None] | missing[:, None, :], 0.0, np.nan_to_num(g.R))
+    if set(g.mask) <= set(ANGLES):
+        R[:, np.arange(m), np.arange(m)] += (extent / np.maximum(g.far, extent + 1e-9))[:, None] ** 2
     R[:, np.arange(m), np.arange(m)] = np.where(missing, 1e18, R[:, np.arange(m), np.arange(m)])
     white = np.linalg.inv(np.linalg.cholesky(R))
     y = np.einsum("kij,kj->ki", white, np.where(missing, 0.0, y))
