@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from boresight.align.window import PolynomialWindow, choose_order
 from boresight.kernels.measurement import measure, wrap
 from boresight.stages.follow import pair
 from boresight.stages.protocol import Belief
-from boresight.stages.scene import AZ, EL, Scene, turn, turn_jacobian
+from boresight.stages.scene import AZ, EL, LEVEL, Scene, turn, turn_jacobian
 from boresight.types import N_COMPONENTS, FloatArray, Scan
 
 BOTH = (int(AZ), int(EL))
@@ -72,16 +73,18 @@ def held_reports(scene: Scene, scan: Scan) -> list[Report] | None:
     if place is None:
         return None
     sensor = scene.sensors[scan.sensor]
-    out = []
-    for i in range(len(t)):
-        z, R = scan.z[i], scan.covariance[i]
-        az, el = float(z[AZ]), float(np.nan_to_num(z[EL]))
-        J = turn_jacobian(sensor, az, el, place.axes[i])
-        cov = J @ np.nan_to_num(R[np.ix_(BOTH, BOTH)]) @ J.T
-        if not np.isfinite(z[EL]):
-            cov[1, :] = cov[:, 1] = 0.0
-        out.append(Report(int(scan.row[i]), float(t[i]), look, z, R, turn(sensor, az, el, place.axes[i]), cov))
-    return out
+    az, el = scan.z[:, AZ], np.nan_to_num(scan.z[:, EL])
+    world, cov = np.stack([az, el], axis=1), np.nan_to_num(scan.covariance[:, AZ : EL + 1, AZ : EL + 1])
+    if sensor.axes not in LEVEL:
+        for i in range(len(t)):
+            J = turn_jacobian(sensor, float(az[i]), float(el[i]), place.axes[i])
+            world[i], cov[i] = turn(sensor, float(az[i]), float(el[i]), place.axes[i]), J @ cov[i] @ J.T
+    flat = ~np.isfinite(scan.z[:, EL])
+    cov[flat, 1, :] = cov[flat, :, 1] = 0.0
+    return [
+        Report(int(row), float(when), look, z, R, direction, P)
+        for row, when, z, R, direction, P in zip(scan.row, t, scan.z, scan.covariance, world, cov, strict=True)
+    ]
 
 
 def by_streak(reports: list[Report], rate: float, gate: float) -> list[list[Report]]:
@@ -91,22 +94,37 @@ def by_streak(reports: list[Report], rate: float, gate: float) -> list[list[Repo
     for r in sorted(reports, key=lambda r: (r.t, r.row)):
         looks.setdefault(r.look, []).append(r)
     for here in looks.values():
-        gap, limit = np.full((len(here), len(streaks)), np.inf), np.zeros((len(here), len(streaks)))
-        for i, r in enumerate(here):
-            for j, streak in enumerate(streaks):
-                last = streak[-1]
-                if r.t <= last.t or np.isfinite(r.z[EL]) != np.isfinite(last.z[EL]):
-                    continue
-                d = r.world - last.world
-                d[0] = wrap(d[0]) * np.cos(r.world[1])
-                gap[i, j] = np.hypot(d[0], d[1])
-                limit[i, j] = gate * np.sqrt(np.trace(r.cov) + np.trace(last.cov)) + rate * (r.t - last.t)
-        for r, j in zip(here, pair(gap, limit), strict=True):
+        taken = np.full(len(here), -1)
+        if streaks:
+            new, old = _points(here), _points([streak[-1] for streak in streaks])
+            turn_az = new.world[:, None, 0] - old.world[None, :, 0]
+            turn_az = (turn_az + np.pi) % (2 * np.pi) - np.pi
+            gap = np.hypot(turn_az * np.cos(new.world[:, None, 1]), new.world[:, None, 1] - old.world[None, :, 1])
+            age = new.t[:, None] - old.t
+            limit = gate * np.sqrt(new.variance[:, None] + old.variance) + rate * age
+            possible = (age > 0.0) & (new.elevated[:, None] == old.elevated)
+            taken = pair(gap, np.where(possible, limit, -1.0))
+        for r, j in zip(here, taken.tolist(), strict=True):
             if j < 0:
                 streaks.append([r])
             else:
                 streaks[j].append(r)
     return streaks
+
+
+class _Points(NamedTuple):
+    """Reports as columns."""
+
+    t: FloatArray  # (n,)
+    world: FloatArray  # (n, 2)
+    variance: FloatArray  # (n,) rad², of both angles
+    elevated: NDArray[np.bool_]  # (n,) whether elevation was measured
+
+
+def _points(reports: list[Report]) -> _Points:
+    variance = np.array([r.cov[0, 0] + r.cov[1, 1] for r in reports])
+    elevated = np.isfinite(np.array([r.z[EL] for r in reports]))
+    return _Points(np.array([r.t for r in reports]), np.array([r.world for r in reports]), variance, elevated)
 
 
 def value_of(
