@@ -52,7 +52,9 @@ def test_the_command_and_its_copy(run: Run, rec: tuple[Path, dict[str, float]], 
     again = run("register", folder, "--reference", "right", "-o", copy)
     assert again.code == 2
     assert "--force" in again.err
-    text = run("register", folder, "--reference", "right")
+    (folder / "tracker.toml").write_text('[pipeline]\nscreen = "prediction"\n', encoding="utf-8")
+    text = run("register", folder, "--reference", "right")  # a pipeline is left aside
+    (folder / "tracker.toml").unlink()
     assert "time offset:" in text.out
     assert "±" in text.out
 

@@ -87,7 +87,8 @@ def compare(
     if json:
         print_json("compare", parameters, rows)
         return
-    print_table(COLUMNS, rows, f"{recording.name}: one recording, {len(rows)} configurations", digits=3)
+    shown = [row | {"config": path.stem} for row, path in zip(rows, config, strict=True)]
+    print_table(COLUMNS, shown, f"{recording.name}: one recording, {len(rows)} configurations", digits=3)
     if output is not None:
         print(f"wrote {output / 'compare.png'}")
 

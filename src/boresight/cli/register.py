@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from boresight.cli.output import print_json, print_table
 from boresight.cli.track import BESIDE, sensor_ids, track_recording
-from boresight.config.tracker import read_tracker_config
+from boresight.config.tracker import read_configuration
 from boresight.errors import UserError, did_you_mean
 from boresight.io.files import RECORDING, check_output
 from boresight.io.recording import read_recording, write_recording
@@ -67,7 +67,8 @@ def register(
     reference
         The sensor that counts as right (a position sensor, lidar or camera if there is one).
     config
-        Tracker configuration (tracker.toml in the recording's folder if there is one, else defaults).
+        Tracker configuration (tracker.toml in the recording's folder if there is one, else defaults); a pipeline in it
+        is left aside: registration needs the reports as they came.
     plot
         Image file (.svg, .png, .pdf) to write with the values and their bands.
     force
@@ -83,7 +84,7 @@ def register(
     used = [i for i, name in enumerate(known) if ids is None or name in ids]
     base = _reference(recording, used, reference)
     source = config if config is not None else (rec / BESIDE if (rec / BESIDE).is_file() else None)
-    settings = TrackerConfig() if source is None else read_tracker_config(source, known)
+    settings = TrackerConfig() if source is None else read_configuration(source, known)[0]
     settings = _told(recording, settings, used, base)
     found, tracks = fit(recording, settings, ids, base)
     rows = rows_of(recording, found)
