@@ -97,7 +97,6 @@ class Settings(NamedTuple):
     static_share: float  # of a new track's existence
     static_q: float  # m²/s
     stop_floor: float  # least weight of "it does not move": a target may stop
-    start_floor: float  # least weight of "it moves", beside that of "it does not": what lay still may set off
     targets_at_start: float  # expected number of targets before the first look
     doubt: float  # least existence with which a track competes for detections
     delete_below: float

@@ -362,12 +362,9 @@ def weigh(tr: Tracks, i: int, log_visible: float, log_static: float, temper: flo
 
 @njit(cache=True)
 def allow_stop(tr: Tracks, i: int, s: Settings) -> None:
-    """Let a target that moved begin to stand still where it is now, the anchor dropped anew; and the reverse."""
+    """Let a target that moved begin to stand still where it is now: the anchor is dropped anew."""
     w = tr.weight[i]
     target = w[VISIBLE] + w[HIDDEN]
-    if target < s.start_floor * w[STATIC]:
-        w[VISIBLE] += s.start_floor * w[STATIC]
-        w[STATIC] -= s.start_floor * w[STATIC]
     if w[STATIC] < s.stop_floor * target:
         w[VISIBLE] -= s.stop_floor * w[VISIBLE]
         w[HIDDEN] -= s.stop_floor * w[HIDDEN]

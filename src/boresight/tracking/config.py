@@ -50,7 +50,6 @@ class TrackerConfig:
     static_share: float = 0.3  # of new objects do not move (and are not reported)
     static_q: float = 0.5  # m²/s, how an object that does not move may still wander
     stop_floor: float = 0.02  # least weight of "it stands still", beside that of a moving target
-    start_floor: float = 0.0  # least weight of "it moves", beside that of "it stands still"
     targets_at_start: float = 5.0  # expected number of targets before the first look
     apart: float = 0.0  # m: a track nearer than this to a shown one is not shown beside it
     doubt: float = 0.1  # least probability of existence with which a track competes for detections

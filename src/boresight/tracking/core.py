@@ -100,7 +100,6 @@ def make_plan(
         static_share=config.static_share,
         static_q=config.static_q,
         stop_floor=config.stop_floor,
-        start_floor=config.start_floor,
         targets_at_start=config.targets_at_start,
         doubt=config.doubt,
         delete_below=config.delete_below,
