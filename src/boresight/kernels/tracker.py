@@ -75,6 +75,7 @@ class SensorTable(NamedTuple):
     elevation_high: float
     ranging: bool  # can begin tracks
     bias: IntArray  # (7,) state index of the bias of each component, -1 for none
+    registers: bool  # has constant errors among the states
     constant: IntArray  # (5,) state index of time offset, range, scale, azimuth and elevation error, -1 for none
     decorrelation: float  # s: looks closer in time than this are not independent evidence of existence
     fade_range: float  # m: where p_detection has fallen to half
@@ -215,10 +216,13 @@ def linearise(
     z: FloatArray,
     H: FloatArray,
     h6: FloatArray,
+    work: FloatArray,
 ) -> None:
-    """Fill `z` (7,) and `H` (7, n) for a track's state `x` seen with the pose of detection `k`, `dt` after the look."""
-    position = np.zeros(3)
-    velocity = np.zeros(3)
+    """Fill `z` (7,) and `H` (7, n) for a track's state `x` seen with the pose of detection `k`, `dt` after the look.
+
+    `work` (2, 3) holds position and velocity; zero in the components that the state lacks.
+    """
+    position, velocity = work[0], work[1]
     for a in range(d):
         position[a] = x[a] + dt * x[d + a]
         velocity[a] = x[d + a]
@@ -233,16 +237,17 @@ def linearise(
         b = sensor.bias[c]
         if b >= 0:
             H[c, b] = 1.0
-    if sensor.constant.max() >= 0:
+    if sensor.registers:
         S = np.empty((7, N_PARAMETERS))
         sensitivity(z, h6, velocity - look.sensor_velocity[k], S)
         for p in range(N_PARAMETERS):
             if sensor.constant[p] >= 0:
                 for c in range(7):
                     H[c, sensor.constant[p]] = S[c, p]
-    for c in range(7):
-        for j in range(2 * d, n):
-            z[c] += H[c, j] * x[j]
+    if n > 2 * d:
+        for c in range(7):
+            for j in range(2 * d, n):
+                z[c] += H[c, j] * x[j]
 
 
 @njit(cache=True)
@@ -419,16 +424,12 @@ def position_fix(
     """
     z = look.z[k]
     R = look.enu_from_sensor[k]
-    local = np.zeros(3)
-    D = np.zeros((3, 3))
-    m = 0
     if math.isfinite(z[4]) and math.isfinite(z[5]):
-        up = z[6] if math.isfinite(z[6]) else 0.0
-        local[0], local[1], local[2] = z[4], z[5], up
+        e, n, u = z[4], z[5], z[6] if math.isfinite(z[6]) else 0.0
         for a in range(3):
-            D[a, a] = 1.0
             mask[a] = 4 + a
-        m = 3
+            for b in range(3):
+                J[a, b] = R[a, b]
     elif math.isfinite(z[0]) and math.isfinite(z[1]):
         el = z[2]
         if not math.isfinite(el):
@@ -439,17 +440,14 @@ def position_fix(
             else:
                 el = 0.5 * (sensor.elevation_low + sensor.elevation_high)
         ce, se, ca, sa = math.cos(el), math.sin(el), math.cos(z[1]), math.sin(z[1])
-        local[0], local[1], local[2] = z[0] * ce * sa, z[0] * ce * ca, z[0] * se
-        D[0, 0], D[1, 0], D[2, 0] = ce * sa, ce * ca, se
-        D[0, 1], D[1, 1] = local[1], -local[0]
-        D[0, 2], D[1, 2], D[2, 2] = -z[0] * se * sa, -z[0] * se * ca, z[0] * ce
-        mask[0], mask[1], mask[2] = 0, 1, 2
-        m = 3
+        e, n, u = z[0] * ce * sa, z[0] * ce * ca, z[0] * se
+        for a in range(3):
+            mask[a] = a
+            J[a, 0] = R[a, 0] * ce * sa + R[a, 1] * ce * ca + R[a, 2] * se
+            J[a, 1] = R[a, 0] * n - R[a, 1] * e
+            J[a, 2] = -R[a, 0] * z[0] * se * sa - R[a, 1] * z[0] * se * ca + R[a, 2] * z[0] * ce
     else:
         return 0
     for a in range(3):
-        fix[a] = look.sensor_position[k, a]
-        for b in range(3):
-            fix[a] += R[a, b] * local[b]
-            J[a, b] = R[a, 0] * D[0, b] + R[a, 1] * D[1, b] + R[a, 2] * D[2, b]
-    return m
+        fix[a] = look.sensor_position[k, a] + R[a, 0] * e + R[a, 1] * n + R[a, 2] * u
+    return 3

@@ -67,14 +67,13 @@ def clutter_density(tr: Tracks, s: Settings, sensor: SensorTable, z: FloatArray,
 
 @njit(cache=True)
 def detection_probability(
-    tr: Tracks, i: int, s: Settings, look: Look, sensor: SensorTable, z: FloatArray, h6: FloatArray
+    tr: Tracks, i: int, s: Settings, look: Look, sensor: SensorTable, z: FloatArray, h6: FloatArray, work: FloatArray
 ) -> float:
     """Probability that the sensor, looking once, reports a visible target where track `i` is; 0 outside coverage."""
     m = len(look.dt)
-    position = np.zeros(3)
     for a in range(s.d):
-        position[a] = tr.x[i, a]
-    measure(position, np.zeros(3), look.sensor_position[m], look.sensor_velocity[m], look.enu_from_sensor[m], z, h6)
+        work[0, a] = tr.x[i, a]
+    measure(work[0], work[1], look.sensor_position[m], look.sensor_velocity[m], look.enu_from_sensor[m], z, h6)
     if not coverage_of(z, sensor, 0.0):
         return 0.0
     p = sensor.p_detection
@@ -106,8 +105,9 @@ def scan_step(
     p_d = np.zeros(n_tracks)
     z = np.empty(7)
     h6 = np.empty((7, 6))
+    work = np.zeros((2, 3))
     for i in range(n_tracks):
-        p_d[i] = detection_probability(tr, i, s, look, sensor, z, h6)
+        p_d[i] = detection_probability(tr, i, s, look, sensor, z, h6, work)
     start, column, cost, distance, loglik = gate_all(tr, s, sensor, look, usable, p_d, fate, owner, nis_of)
     col_of_row = np.full(n_tracks, -1, np.int64)
     assign_sparse(start, column, cost, m, col_of_row)
@@ -151,7 +151,7 @@ def scan_step(
         begin(tr, s, sensor, look, fate, owner, row_of_col, usable)
     if sensor.ranging:
         show(tr, s, sensor, look)
-    end_and_merge(tr, s, sensor.ranging)
+    end_and_merge(tr, s, sensor.ranging, start)
     tr.live[1] += 1
 
 
@@ -184,16 +184,15 @@ def gate_all(
     S = np.empty((7, 7))
     PHt = np.empty((n, 7))
     mask = np.empty(7, np.int64)
+    work = np.zeros((2, 3))
     near = np.full(m, np.inf)
     log_density = np.empty(m)
-    for k in range(m):
-        c = components(look.z[k], s.d, mask)
-        log_density[k] = math.log(max(clutter_density(tr, s, sensor, look.z[k], mask, c), 1e-300))
+    most = log_densities(tr, s, sensor, look, log_density)
     fixes = np.zeros((m, 3))
     spread, dt_high = fix_all(s, sensor, look, usable, fixes)
     near_only = math.isfinite(spread)
     order = np.argsort(fixes[:, 0]) if near_only else np.arange(m)
-    east = fixes[order, 0]
+    east, north = fixes[order, 0], fixes[order, 1]
     used = 0
     for i in range(n_tracks):
         start[i] = used
@@ -207,15 +206,17 @@ def gate_all(
         first, last = 0, m
         reach = np.inf
         if near_only:
-            reach = reach_of(tr, i, s, spread, dt_high)
+            reach = reach_of(tr, i, s, spread, dt_high, s.gates[most])
             first = np.searchsorted(east, tr.x[i, 0] - reach)
             last = np.searchsorted(east, tr.x[i, 0] + reach, side="right")
         for at in range(first, last):
+            if near_only and abs(north[at] - tr.x[i, 1]) > reach:
+                continue
             k = order[at]
-            if not usable[k] or (near_only and abs(fixes[k, 1] - tr.x[i, 1]) > reach):
+            if not usable[k]:
                 continue
             if last_pose < 0 or look.dt[k] != look.dt[last_pose]:
-                linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, zhat, H, h6)
+                linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, zhat, H, h6, work)
                 last_pose = k
             c = components(look.z[k], s.d, mask)
             if c == 0:
@@ -249,6 +250,29 @@ def gate_all(
 
 
 @njit(cache=True)
+def log_densities(tr: Tracks, s: Settings, sensor: SensorTable, look: Look, out: FloatArray) -> int:
+    """Fill the log clutter density at every detection (m,); returns the largest number of components."""
+    most = 0
+    mask = np.full(7, -1, np.int64)
+    before = np.full(7, -1, np.int64)
+    count = -1  # of the components before
+    value = 0.0
+    for k in range(len(look.dt)):
+        c = components(look.z[k], s.d, mask)
+        most = max(most, c)
+        # for ranging sensors it depends on which components are measured alone
+        same = sensor.ranging and c == count
+        for j in range(c):
+            same = same and mask[j] == before[j]
+            before[j] = mask[j]
+        count = c
+        if not same:
+            value = math.log(max(clutter_density(tr, s, sensor, look.z[k], mask, c), 1e-300))
+        out[k] = value
+    return most
+
+
+@njit(cache=True)
 def fix_all(
     s: Settings, sensor: SensorTable, look: Look, usable: NDArray[np.bool_], fixes: FloatArray
 ) -> tuple[float, float]:
@@ -260,11 +284,12 @@ def fix_all(
     dt_high = 0.0
     R = np.empty((3, 3))
     J = np.zeros((3, 3))
+    work = np.empty((3, 3))
     mask = np.empty(3, np.int64)
     for k in range(len(look.dt)):
         if not usable[k]:
             continue
-        if not sensor.ranging or not world_fix(look, k, s, sensor, fixes[k], R, J, mask):
+        if not sensor.ranging or not world_fix(look, k, s, sensor, fixes[k], R, J, mask, work):
             return np.inf, 0.0
         total = R[0, 0] + R[1, 1] + (R[2, 2] if s.d == 3 else 0.0)
         for e in range(3):
@@ -283,7 +308,7 @@ def constant_spread(
 ) -> float:
     """Variance (m²) that the declared constant errors of the sensor may add to a detection's world position."""
     total = 0.0
-    if sensor.constant.max() < 0:
+    if not sensor.registers:
         return total
     # the target's own motion is not known yet: a fast one across both axes stands for it
     fast = np.full(3, 3.0 * s.speed_sigma)
@@ -296,7 +321,7 @@ def constant_spread(
 
 
 @njit(cache=True)
-def reach_of(tr: Tracks, i: int, s: Settings, spread: float, dt: float) -> float:
+def reach_of(tr: Tracks, i: int, s: Settings, spread: float, dt: float, gate: float) -> float:
     """Distance (m) beyond which no detection can be in the gate of track `i`: NIS >= d² / trace(S), twice over."""
     total = spread
     speed = 0.0
@@ -304,7 +329,7 @@ def reach_of(tr: Tracks, i: int, s: Settings, spread: float, dt: float) -> float
         v = s.d + a
         total += tr.P[i, a, a] + 2.0 * dt * abs(tr.P[i, a, v]) + dt * dt * tr.P[i, v, v]
         speed += tr.x[i, v] ** 2
-    return 2.0 * math.sqrt(s.gates[7] * total) + dt * math.sqrt(speed)
+    return 2.0 * math.sqrt(gate * total) + dt * math.sqrt(speed)
 
 
 @njit(cache=True)
@@ -388,7 +413,8 @@ def take(
     S = np.empty((7, 7))
     PHt = np.empty((n, 7))
     mask = np.empty(7, np.int64)
-    linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, zhat, H, h6)
+    work = np.zeros((2, 3))
+    linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, zhat, H, h6, work)
     c = components(look.z[k], s.d, mask)
     innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, c, y, S, PHt, s.d, sensor.constant[TIME])
     log_static = log_visible
@@ -396,7 +422,7 @@ def take(
     fix_R = np.empty((3, 3))
     J = np.zeros((3, 3))
     used = np.empty(3, np.int64)
-    if sensor.ranging and world_fix(look, k, s, sensor, fix, fix_R, J, used):
+    if sensor.ranging and world_fix(look, k, s, sensor, fix, fix_R, J, used, np.empty((3, 3))):
         moving = moving_likelihood(tr, i, s, sensor, look, k, fix, fix_R, J, used)
         log_static += static_likelihood(tr, i, s, fix, fix_R, True) - moving
     if sensor.moves_tracks:
@@ -436,7 +462,7 @@ def moving_likelihood(
         for e in range(3):
             if sensor.bias[mask[e]] >= 0:
                 G[a, sensor.bias[mask[e]]] += J[a, e]
-    if sensor.constant.max() >= 0:
+    if sensor.registers:
         velocity = np.zeros(3)
         velocity[:d] = tr.x[i, d : 2 * d]
         C = fix_sensitivity(look, k, sensor, fix, J, mask, velocity)
@@ -481,18 +507,21 @@ def world_fix(
     fix_R: FloatArray,
     J: FloatArray,
     mask: IntArray,
+    work: FloatArray,
 ) -> bool:
-    """Fill a detection's world position (3,) and its white covariance (3, 3); False where it gives no position."""
+    """Fill a detection's world position (3,) and its white covariance (3, 3); False where it gives no position.
+
+    `work` is (3, 3).
+    """
     if position_fix(look, k, s, sensor, fix, J, mask) == 0:
         return False
-    R = np.zeros((3, 3))
-    component_covariance(look, k, s, sensor, mask, R)
+    component_covariance(look, k, s, sensor, mask, work)
     for a in range(3):
         for b in range(3):
             acc = 0.0
             for e in range(3):
                 for f in range(3):
-                    acc += J[a, e] * R[e, f] * J[b, f]
+                    acc += J[a, e] * work[e, f] * J[b, f]
             fix_R[a, b] = acc
     return True
 
@@ -614,7 +643,7 @@ def begin(
                         shared += J[a, e] * P[bias, bias] * J[b, e]
                 P[a, b] = acc + shared + ((dt * s.speed_sigma) ** 2 if a == b else 0.0)
                 tr.anchor_P[i, a, b] = acc
-        if sensor.constant.max() >= 0:
+        if sensor.registers:
             apply_constants(tr, i, s, look, k, sensor, fix, J, mask)
         density = tr.clutter[sensor.number, AZIMUTH_BINS]
         born = max(expected / (expected + density), 5.0 * s.delete_below)
@@ -735,8 +764,9 @@ def condition_on_rate(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look
     S = np.empty((7, 7))
     PHt = np.empty((n, 7))
     mask = np.empty(7, np.int64)
+    work = np.zeros((2, 3))
     mask[0] = 3
-    linearise(tr.x[i], s.d, k, 0.0, look, sensor, zhat, H, h6)
+    linearise(tr.x[i], s.d, k, 0.0, look, sensor, zhat, H, h6, work)
     innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, 1, y, S, PHt, s.d, sensor.constant[TIME])
     apply_update(tr.x[i], tr.P[i], y, S, PHt, 1, n - s.n_constant)
 
@@ -761,7 +791,7 @@ def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look) -> None:
 @njit(cache=True)
 def stands_apart(tr: Tracks, i: int, s: Settings) -> bool:
     """Whether no shown track is so near that `i` may be another part of the same object."""
-    for j in range(tr.live[0]):
+    for j in range(tr.live[0] if s.apart > 0.0 else 0):
         if tr.life[j, 2] > 0.0 and j != i:
             gap = 0.0
             for a in range(s.d):
@@ -772,14 +802,19 @@ def stands_apart(tr: Tracks, i: int, s: Settings) -> bool:
 
 
 @njit(cache=True)
-def end_and_merge(tr: Tracks, s: Settings, merging: bool) -> None:
-    """Drop tracks that are probably nothing, and the weaker of two that have become one."""
+def end_and_merge(tr: Tracks, s: Settings, merging: bool, start: IntArray) -> None:
+    """Drop tracks that are probably nothing, and the weaker of two that have become one.
+
+    `start` is the candidate list of this look: a track whose gate holds many detections needs the more weight to live,
+    since the next one in it will be its own the less probably.
+    """
     n_tracks = tr.live[0]
     keep = np.ones(n_tracks, np.bool_)
     for i in range(n_tracks):
         w = tr.weight[i]
         target = w[VISIBLE] + w[HIDDEN]
-        if target + w[STATIC] < s.delete_below:
+        crowd = start[i + 1] - start[i] if i + 1 < len(start) else 1
+        if target + w[STATIC] < s.delete_below * max(1, crowd):
             save_lesson(tr, i, s)
             keep[i] = False
         elif target < s.hide_below:

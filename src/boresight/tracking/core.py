@@ -75,6 +75,7 @@ def make_plan(
                 elevation_high=c.elevation[1],
                 ranging=sensor.kind not in (SensorKind.INFRARED, SensorKind.OPTICAL),
                 bias=bias,
+                registers=False,
                 constant=constants[index],
                 decorrelation=errors.decorrelation,
                 fade_range=errors.fade_range,
@@ -87,6 +88,7 @@ def make_plan(
     tau += [math.inf] * len(known)
     for place, (_, (index, parameter)) in enumerate(known):
         constants[index][parameter] = 2 * d + len(sigma) - len(known) + place
+    tables = [t._replace(registers=bool((t.constant >= 0).any())) for t in tables]
     gates = np.array([0.0, *chi2.ppf(config.gate_probability, np.arange(1, 8))])
     settings = Settings(
         d=d,
