@@ -76,42 +76,48 @@ TRACKER_TOML = """\
 # Settings for the Autoferry sensor suite, one set for all scenarios; `boresight track` uses this file unless --config
 # names another.
 [tracker]
-speed_sigma_m_s = 5.0
-birth_rate = 0.003
+gate_probability = 0.95
+speed_sigma_m_s = 4.5
+birth_rate = 0.005
+targets_at_start = 2.0
 show_time_s = 5.0
 static_share = 0.2
 static_wander_m2_s = 0.2
 stop_floor = 0.005
 doubt = 0.01
 confirm_above = 0.95
-hide_below = 0.6
+hide_below = 0.4
 merge_distance_m = 15.0
+apart_m = 22.0
 clutter_memory_looks = 15.0
 
 [[sensor]]
 id = "radar"
-bias_position_m = 1.5
-bias_time_s = 20.0
-resolution_m = 20.0
+bias_position_m = 1.3
+bias_time_s = 30.0
+resolution_m = 23.0
 report_range_m = 250.0
 
 [[sensor]]
 id = "lidar"
 bias_position_m = 2.0
 bias_time_s = 20.0
-report_range_m = 60.0
+resolution_m = 10.0
+report_range_m = 0.0        # begins and moves tracks; they are shown when the radar sees them
 
 [[sensor]]
 id = "ir"
-bias_azimuth_deg = 4.0
-bias_time_s = 40.0
-decorrelation_s = 2.0
+bias_azimuth_deg = 3.5      # of the kind that no two bearings agree on: evidence, not position
+bias_time_s = 30.0
+decorrelation_s = 1.4
+moves_tracks = false
 
 [[sensor]]
 id = "eo"
-bias_azimuth_deg = 4.0
-bias_time_s = 40.0
-decorrelation_s = 2.0
+bias_azimuth_deg = 3.5
+bias_time_s = 30.0
+decorrelation_s = 1.4
+moves_tracks = false
 """
 
 
