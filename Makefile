@@ -39,7 +39,7 @@ bench: $(VENV)/.bench ## measure speed against the peers (Stone Soup, FilterPy, 
 	$(BIN)/python -m benchmarks
 
 scoreboard: $(VENV)/.run ## the real recordings in ../shared/data, every sensor combination
-	$(BIN)/python -m benchmarks.scoreboard
+	$(BIN)/python -m benchmarks.scoreboard --page docs
 
 lock: ## pin the dependencies again (needs uv)
 	@printf 'hatchling>=1.27\neditables\n' > .build.in

@@ -3,11 +3,14 @@
 Reads the Autoferry scenarios from `../shared/data/autoferry` (or the folder given), tracks each with the settings that
 `boresight import autoferry` writes, scores them, and prints one row per combination: each scenario's GOSPA RMS, the
 pooled one, and beside them an empty tracker and the figures of Stone Soup 1.9.1's JPDA (tuned with truth on these).
+Two more rows: all sensors without the declared limits on the range of what is shown, and the fixed-lag smoothed tracks
+6 s later. `--page docs` writes the table into docs/scoreboard.md and the plot beside it.
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import sys
 import tempfile
@@ -24,9 +27,11 @@ from boresight.io.autoferry import TRACKER_TOML, import_autoferry
 from boresight.io.scans import iter_scans
 from boresight.metrics.score import Score, score
 from boresight.tracking.config import TrackerConfig
+from boresight.tracking.output import Rows
 from boresight.tracking.run import run, track_rows, tracker_for
 from boresight.types import Recording
 
+MARKS = ("<!-- table -->", "<!-- end of table -->")
 ROOT = Path(__file__).parents[1]
 DATA = ROOT.parent / "shared" / "data" / "autoferry"
 SCENARIOS = (2, 3, 4, 13, 16)
@@ -85,20 +90,38 @@ def pooled(scores: list[Score], seconds: list[float]) -> dict[str, Any]:
     }
 
 
-def rows(folder: Path) -> list[dict[str, Any]]:
-    """Track and score every combination; one row each, and one for the empty tracker."""
+def unlimited(config: TrackerConfig) -> TrackerConfig:
+    """Return the settings without limits on the range of what ranging sensors show."""
+    open_ = {name: dataclasses.replace(e, report_range=float("inf")) for name, e in config.sensors.items()}
+    return dataclasses.replace(config, sensors=open_)
+
+
+def scored(data: dict[int, Recording], config: TrackerConfig, sensors: list[str]) -> tuple[list[Score], list[float]]:
+    """Track and score every recording; with a smoothing lag in the settings the smoothed tracks. CPU seconds beside."""
+    scores, seconds = [], []
+    for recording in data.values():
+        tracker, scans = tracker_for(recording, config, sensors), list(iter_scans(recording, sensors))
+        run(tracker, scans[:20])  # kernels loaded
+        past: list[Rows] = []
+        started = time.process_time()
+        _, made, _ = run(tracker, scans, watch=lambda _, out: past.extend(out.smoothed))  # noqa: B023
+        seconds.append(time.process_time() - started)
+        scores.append(score(recording, track_rows(made if config.smoothing_lag is None else past), None, sensors))
+    return scores, seconds
+
+
+def rows(folder: Path, keep: dict[str, list[Score]] | None = None) -> list[dict[str, Any]]:
+    """Track and score every combination; one row each, and one for the empty tracker. `keep` gets the scores."""
     data = recordings(folder)
     config = configuration(next(iter(data.values())))
     out: list[dict[str, Any]] = []
-    for name, sensors in COMBINATIONS.items():
-        scores, seconds = [], []
-        for recording in data.values():
-            tracker, scans = tracker_for(recording, config, sensors), list(iter_scans(recording, sensors))
-            run(tracker, scans[:20])  # kernels loaded
-            started = time.process_time()
-            _, made, _ = run(tracker, scans)
-            seconds.append(time.process_time() - started)
-            scores.append(score(recording, track_rows(made), None, sensors))
+    cases = [(name, config, sensors) for name, sensors in COMBINATIONS.items()]
+    cases.append(("all, range not limited", unlimited(config), COMBINATIONS["all"]))
+    cases.append(("all, smoothed 6 s later", dataclasses.replace(config, smoothing_lag=6.0), COMBINATIONS["all"]))
+    for name, settings, sensors in cases:
+        scores, seconds = scored(data, settings, sensors)
+        if keep is not None:
+            keep[name] = scores
         each = {f"scenario_{n}": float(np.sqrt((s.gospa[:, 0] ** 2).mean())) for n, s in zip(data, scores, strict=True)}
         soup = dict(zip(("gospa", "tracked", "false_s", "rmse"), STONE_SOUP.get(name, (None,) * 4), strict=True))
         out.append(
@@ -135,13 +158,50 @@ def table(found: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def plot(kept: dict[str, list[Score]], path: Path) -> None:
+    """Draw GOSPA over time, one panel for each recording."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, panels = plt.subplots(1, len(SCENARIOS), figsize=(15, 3.2), sharey=True, layout="constrained")
+    for k, (panel, number) in enumerate(zip(panels, SCENARIOS, strict=True)):
+        for name, colour in (("radar", "#888888"), ("radar + ir", "#c4452f"), ("all", "#0b6aa2")):
+            s = kept[name][k]
+            panel.plot(s.clock - s.clock[0], s.gospa[:, 0], color=colour, lw=1.2, label=name)
+        panel.axhline(20.0, color="#111111", lw=0.8, ls="--", label="no tracker")
+        panel.set(title=f"scenario {number}", xlabel="time, s", ylim=(0.0, 36.0))
+        panel.grid(alpha=0.3)
+    panels[0].set_ylabel("GOSPA, m")
+    panels[0].legend(fontsize=7, loc="upper right")
+    figure.savefig(path, dpi=80)
+    plt.close(figure)
+
+
+def write_page(folder: Path, found: list[dict[str, Any]], kept: dict[str, list[Score]]) -> None:
+    """Put the table between the marks of scoreboard.md in `folder`, and the plot into its img/."""
+    page = folder / "scoreboard.md"
+    text = page.read_text(encoding="utf-8")
+    before, _, rest = text.partition(MARKS[0])
+    _, _, after = rest.partition(MARKS[1])
+    if not after:
+        raise UserError(f"{page}: the marks {MARKS[0]} and {MARKS[1]} are missing")
+    plot(kept, folder / "img" / "scoreboard.png")
+    page.write_text(f"{before}{MARKS[0]}\n\n{table(found)}\n\n{MARKS[1]}{after}", encoding="utf-8")
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="?", default=DATA)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--page", type=Path, help="folder of scoreboard.md: write table and plot there")
     arguments = parser.parse_args()
+    kept: dict[str, list[Score]] = {}
     try:
-        found = rows(arguments.folder)
+        found = rows(arguments.folder, kept)
+        if arguments.page is not None:
+            write_page(arguments.page, found, kept)
     except UserError as error:
         print(f"scoreboard: {error}", file=sys.stderr)
         return 2
