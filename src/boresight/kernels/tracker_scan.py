@@ -284,14 +284,18 @@ def fix_all(
     dt_high = 0.0
     R = np.empty((3, 3))
     J = np.zeros((3, 3))
-    work = np.empty((3, 3))
     mask = np.empty(3, np.int64)
     for k in range(len(look.dt)):
         if not usable[k]:
             continue
-        if not sensor.ranging or not world_fix(look, k, s, sensor, fixes[k], R, J, mask, work):
+        if not sensor.ranging or position_fix(look, k, s, sensor, fixes[k], J, mask) == 0:
             return np.inf, 0.0
-        total = R[0, 0] + R[1, 1] + (R[2, 2] if s.d == 3 else 0.0)
+        component_covariance(look, k, s, sensor, mask, R)
+        total = 0.0  # the trace of J R J'
+        for e in range(3):
+            for f in range(3):
+                for a in range(s.d):
+                    total += J[a, e] * R[e, f] * J[a, f]
         for e in range(3):
             b = sensor.bias[mask[e]]
             if b >= 0:
