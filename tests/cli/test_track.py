@@ -150,3 +150,42 @@ def test_score_without_truth(rec: Path, out: Path, tmp_path: Path) -> None:
         if file.name != "truth.parquet":
             (copy / file.name).write_bytes(file.read_bytes())
     one_line(boresight("score", out, copy), "truth")
+
+
+def test_lag_writes_smoothed_tracks_that_score_takes(rec: Path) -> None:
+    folder = rec.parent / "lagged"
+    done = boresight("track", rec, "-o", folder, "--lag", "4", "--no-report")
+    assert done.returncode == 0, done.stderr
+    smoothed = pq.read_table(folder / "smoothed.parquet")
+    assert smoothed.column_names == COLUMNS
+    assert smoothed.num_rows > 20
+    causal = json.loads(boresight("score", folder, rec, "--json").stdout)["rows"][0]
+    later = json.loads(boresight("score", folder, rec, "--smoothed", "--json").stdout)["rows"][0]
+    assert later["position_rmse_m"] < causal["position_rmse_m"]
+
+
+@pytest.mark.parametrize("lag", ["-1", "1000", "nan"])
+def test_a_lag_out_of_range_ends_in_one_line(rec: Path, lag: str) -> None:
+    done = boresight("track", rec, "-o", rec.parent / "never", f"--lag={lag}")
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "--lag" in done.stderr
+    assert not (rec.parent / "never").exists()
+
+
+def test_score_smoothed_without_them_says_how(rec: Path, out: Path) -> None:
+    done = boresight("score", out, rec, "--smoothed")
+    assert done.returncode == 2
+    assert "--lag" in done.stderr
+
+
+def test_registration_is_printed_and_written(rec: Path) -> None:
+    settings = rec.parent / "register.toml"
+    settings.write_text('[[sensor]]\nid = "radar"\noffset_time_s = 0.5\noffset_azimuth_deg = 1.0\n')
+    folder = rec.parent / "registered"
+    done = boresight("track", rec, "-o", folder, "--config", settings)
+    assert done.returncode == 0, done.stderr
+    assert "radar: time_offset_s" in done.stdout
+    table = pq.read_table(folder / "registration.parquet").to_pydict()
+    assert set(table["parameter"]) == {"time_offset_s", "azimuth_offset_deg"}
+    assert "registration" in (folder / "report.html").read_text(encoding="utf-8")
