@@ -161,8 +161,7 @@ class Tracker:
     def _emit(self, state: TrackerState, out: Output, t: float, t_known: float) -> None:
         rows = rows_at(state.window.tracks, self.plan, t, t_known, self.config.coast_after)
         if rows is not None:
-            ids = np.array([_number(state, birth, t) for birth in rows.birth.tolist()], dtype=np.int64)
-            out.rows.append(replace(rows, track_id=ids))
+            out.rows.append(replace(rows, track_id=_number(state, rows.birth.tolist(), t)))
 
     def _look(self, scan: Scan) -> Look | None:
         """Take the declared latency off and place the sensor; None where there is no pose for it."""
@@ -199,13 +198,14 @@ def _poses(sensor: Sensor, track: PoseTrack | None, times: FloatArray) -> tuple[
     return sensor_pose(sensor, track, times)
 
 
-def _number(state: TrackerState, birth: int, t: float) -> int:
-    """Return the id of a track's row at `t`: a live track has a row every half second, one shown again begins anew."""
-    if t - state.last_row.get(birth, -np.inf) > MAX_ROW_GAP:
+def _number(state: TrackerState, births: list[int], t: float) -> NDArray[np.int64]:
+    """Return the ids of rows at `t`: a live track has a row every half second, one shown again begins anew."""
+    last = state.last_row.get
+    for birth in [b for b in births if t - last(b, -np.inf) > MAX_ROW_GAP]:
         state.numbered += 1
         state.names[birth] = state.numbered
-    state.last_row[birth] = t
-    return state.names[birth]
+    state.last_row.update(dict.fromkeys(births, t))
+    return np.fromiter(map(state.names.__getitem__, births), np.int64, len(births))
 
 
 def _decisions(entry: Entry) -> list[Decision]:
