@@ -134,3 +134,19 @@ def test_workers(method: str) -> None:
     expected = updated()  # a forked worker finds the kernels loaded
     with multiprocessing.get_context(method).Pool(2) as pool:
         assert pool.map(updated, range(4)) == [expected] * 4
+
+
+def test_caches_of_other_kernels_are_dropped(tmp_path: Path) -> None:
+    """Numba would keep a caller compiled against a callee that has changed since."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-c", "import boresight.kernels"]
+    subprocess.run(command, env=environment, check=True)
+    (stamp,) = tmp_path.rglob("kernels.stamp")
+    index = stamp.parent / "some.kernel.nbi"
+    index.write_text("")
+    subprocess.run(command, env=environment, check=True)
+    assert index.exists()  # nothing has changed
+    stamp.write_text("of another version")
+    subprocess.run(command, env=environment, check=True)
+    assert not index.exists()
+    assert stamp.read_text() != "of another version"

@@ -1,12 +1,14 @@
-"""Compiled kernels: float64 arrays in and out. Importing this makes sure that there is a folder to cache them in."""
+"""Compiled kernels: float64 arrays in and out. Importing this makes sure that their cache is writable and true."""
 
 from __future__ import annotations
 
 import atexit
+import hashlib
 import os
 import shutil
 import sys
 import tempfile
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -27,7 +29,7 @@ def _ensure_cache() -> None:
     Numba tries NUMBA_CACHE_DIR, then __pycache__ beside the kernels, then the user's cache folder.
     """
     try:
-        njit(cache=True)(_probe)
+        _drop_stale(njit(cache=True)(_probe))
     except (RuntimeError, OSError):
         try:
             folder = tempfile.mkdtemp(prefix="boresight-kernels-")
@@ -43,6 +45,27 @@ def _ensure_cache() -> None:
             file=sys.stderr,
             flush=True,
         )
+
+
+def _drop_stale(probe: Any) -> None:
+    """Drop what is cached where any kernel's file has changed since.
+
+    Numba looks at a function's own file only: after an update it would join a caller compiled before with a callee of
+    now, whose arguments may mean something else.
+    """
+    here = Path(__file__).parent
+    files = sorted((f.name, f.stat().st_size, f.stat().st_mtime_ns) for f in here.glob("*.py"))
+    stamp = hashlib.sha256(repr(files).encode()).hexdigest()
+    folder = Path(probe._cache.cache_path)
+    note = folder / "kernels.stamp"
+    if note.is_file() and note.read_text() == stamp:
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    for index in folder.glob("*.nbi"):
+        index.unlink(missing_ok=True)
+    fresh = folder / f"kernels.stamp.{os.getpid()}"
+    fresh.write_text(stamp)
+    fresh.replace(note)
 
 
 def _remove(folder: str, owner: int) -> None:
