@@ -127,6 +127,10 @@ def scan_step(
     tr.last_look[sensor.number] = look.t
     for i in range(n_tracks):
         if p_d[i] <= 0.0:
+            if tr.life[i, 3] < 2.0 and tr.heard[i] == 1 << (sensor.number % 62):
+                # begun at the very edge of the coverage, where it cannot be seen again: it must not wait there for ever
+                log_miss = math.log(1.0 - sensor.p_detection)
+                weigh(tr, i, log_miss, log_miss, temper)
             continue
         k = col_of_row[i]
         shy = s.lonely_bearings and not sensor.ranging
