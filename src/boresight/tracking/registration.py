@@ -10,7 +10,7 @@ import numpy as np
 
 from boresight.kernels.registration import AZIMUTH, ELEVATION, RANGE, SCALE, TIME
 from boresight.kernels.tracker import Tracks
-from boresight.kernels.tracker_scan import pooled_constants
+from boresight.kernels.tracker_begin import pooled_constants
 from boresight.tracking.core import Plan
 from boresight.tracking.tracker import Tracker, TrackerState
 from boresight.types import RegistrationRows

@@ -1,0 +1,219 @@
+"""How a track begins, and what it is told of the sensors' constant errors."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from boresight.kernels.registration import TIME, learned, pool
+from boresight.kernels.tracker import (
+    AZIMUTH_BINS,
+    HIDDEN,
+    INITIATED,
+    NOTHING,
+    STATIC,
+    VISIBLE,
+    IntArray,
+    Look,
+    SensorTable,
+    Settings,
+    Tracks,
+)
+from boresight.kernels.tracker_place import component_covariance, fix_sensitivity, position_fix
+from boresight.kernels.tracker_state import apply_update, innovation, linearise
+from boresight.types.sensor import FloatArray
+
+
+@njit(cache=True)
+def begin(
+    tr: Tracks,
+    s: Settings,
+    sensor: SensorTable,
+    look: Look,
+    fate: IntArray,
+    owner: IntArray,
+    row_of_col: IntArray,
+    usable: NDArray[np.bool_],
+) -> None:
+    """Begin a track at every detection with a position that no track took."""
+    d = s.d
+    n = tr.x.shape[1]
+    J = np.zeros((3, 3))
+    fix = np.empty(3)
+    mask = np.empty(3, np.int64)
+    R = np.zeros((3, 3))
+    if tr.live[1] == 0:  # a first look full of targets must not pass for clutter: take them at their number
+        spare = 0.0
+        for k in range(len(look.dt)):
+            spare += 1.0 if usable[k] else 0.0
+        tr.undetected[0] = max(tr.undetected[0], spare - tr.clutter[sensor.number, AZIMUTH_BINS])
+    pooled = pooled_constants(tr, s)
+    expected = tr.undetected[0] * sensor.p_detection
+    tr.undetected[0] += s.birth_rate - expected
+    for k in range(len(look.dt)):
+        if not usable[k] or row_of_col[k] >= 0 or position_fix(look, k, s, sensor, fix, J, mask) == 0:
+            continue
+        component_covariance(look, k, s, sensor, mask, R)
+        i = tr.live[0]
+        tr.live[0] += 1
+        x, P = tr.x[i], tr.P[i]
+        x[:] = 0.0
+        P[:, :] = 0.0
+        tr.anchor[i] = 0.0
+        tr.anchor_P[i] = 0.0
+        for j in range(n - 2 * d - s.n_constant):
+            P[2 * d + j, 2 * d + j] = s.bias_sigma[j] ** 2
+        tell(tr, i, s, pooled)
+        for e in range(3):  # position covariance from noise and bias, and what it shares with the bias
+            b = sensor.bias[mask[e]]
+            for a in range(d):
+                if b >= 0:
+                    P[a, b] -= J[a, e] * P[b, b]
+                    P[b, a] = P[a, b]
+        dt = look.dt[k]
+        for a in range(d):
+            x[a] = fix[a]
+            tr.anchor[i, a] = fix[a]
+            P[d + a, d + a] = s.speed_sigma**2
+            P[a, d + a] = -dt * s.speed_sigma**2  # seen at its own time, kept at the look's
+            P[d + a, a] = P[a, d + a]
+            for b in range(d):
+                acc = 0.0
+                shared = 0.0
+                for e in range(3):
+                    for f in range(3):
+                        acc += J[a, e] * R[e, f] * J[b, f]
+                    bias = sensor.bias[mask[e]]
+                    if bias >= 0:
+                        shared += J[a, e] * P[bias, bias] * J[b, e]
+                P[a, b] = acc + shared + ((dt * s.speed_sigma) ** 2 if a == b else 0.0)
+                tr.anchor_P[i, a, b] = acc
+        if sensor.registers:
+            apply_constants(tr, i, s, look, k, sensor, fix, J, mask)
+        density = tr.clutter[sensor.number, AZIMUTH_BINS]
+        born = max(expected / (expected + density), 5.0 * s.delete_below)
+        w = tr.weight[i]
+        w[VISIBLE] = born * (1.0 - s.static_share)
+        w[HIDDEN] = 0.0
+        w[STATIC] = born * s.static_share
+        w[NOTHING] = 1.0 - born
+        tr.birth[i] = look.row[k]
+        tr.heard[i] = 1 << (sensor.number % 62)
+        tr.life[i, 0] = look.t + look.dt[k]
+        tr.life[i, 1] = tr.life[i, 0]
+        tr.life[i, 2] = 0.0
+        tr.life[i, 3] = 1.0
+        fate[k] = INITIATED
+        owner[k] = look.row[k]
+        if math.isfinite(look.z[k, 3]):
+            condition_on_rate(tr, i, s, sensor, look, k)
+
+
+@njit(cache=True)
+def pooled_constants(tr: Tracks, s: Settings) -> FloatArray:
+    """Information (k, k + 1) on the constant sensor errors from all shown tracks and those that have ended."""
+    k = s.n_constant
+    pooled = np.zeros((k, k + 1))
+    if k > 0:
+        live = tr.live[0]
+        sigma = s.bias_sigma[len(s.bias_sigma) - k :]
+        pool(tr.x[:live], tr.P[:live], tr.life[:live, 2], tr.told, tr.bank, sigma, pooled)
+    return pooled
+
+
+@njit(cache=True)
+def tell(tr: Tracks, i: int, s: Settings, pooled: FloatArray) -> None:
+    """Give a new track what is known of the constant errors, and note what it was told."""
+    k = s.n_constant
+    if k == 0:
+        return
+    first = tr.x.shape[1] - k
+    tr.told[i] = pooled
+    covariance = np.linalg.inv(np.ascontiguousarray(pooled[:, :k]))
+    for a in range(k):
+        tr.x[i, first + a] = 0.0
+        for b in range(k):
+            tr.x[i, first + a] += covariance[a, b] * pooled[b, k]
+            tr.P[i, first + a, first + b] = 0.5 * (covariance[a, b] + covariance[b, a])
+
+
+@njit(cache=True)
+def apply_constants(
+    tr: Tracks,
+    i: int,
+    s: Settings,
+    look: Look,
+    k: int,
+    sensor: SensorTable,
+    fix: FloatArray,
+    J: FloatArray,
+    mask: IntArray,
+) -> None:
+    """Take the constant errors off a new track's position, with their covariance: pos = fix - C e, e the errors."""
+    d = s.d
+    n = tr.x.shape[1]
+    first = n - s.n_constant
+    x, P = tr.x[i], tr.P[i]
+    C = fix_sensitivity(look, k, sensor, fix, J, mask, np.zeros(3))
+    full = np.zeros((d, n))
+    for p in range(len(sensor.constant)):
+        j = sensor.constant[p]
+        if j >= 0:
+            full[:, j] = C[:d, p]
+    for a in range(d):
+        for j in range(first, n):
+            x[a] -= full[a, j] * x[j]
+            tr.anchor[i, a] -= full[a, j] * x[j]
+    for a in range(d):
+        for b in range(d):
+            for j in range(first, n):
+                for m in range(first, n):
+                    P[a, b] += full[a, j] * P[j, m] * full[b, m]
+    for a in range(d):
+        for j in range(first, n):
+            acc = 0.0
+            for m in range(first, n):
+                acc += full[a, m] * P[m, j]
+            P[a, j] -= acc
+            P[j, a] = P[a, j]
+        if sensor.constant[TIME] >= 0:  # the target moved by an unknown velocity in the unknown time
+            lag = sensor.constant[TIME]
+            P[a, a] += s.speed_sigma**2 * (P[lag, lag] + x[lag] ** 2)
+            P[a, d + a] += s.speed_sigma**2 * x[lag]
+            P[d + a, a] = P[a, d + a]
+
+
+@njit(cache=True)
+def save_lesson(tr: Tracks, i: int, s: Settings) -> None:
+    """Keep what a track that ends, or becomes another, has learned of the constant errors."""
+    k = s.n_constant
+    if k == 0 or tr.life[i, 2] == 0.0:
+        return
+    info = np.empty((k, k))
+    vector = np.empty(k)
+    learned(tr.x[i], tr.P[i], tr.x.shape[1] - k, info, vector)
+    tr.bank[:, :k] += info - tr.told[i, :, :k]
+    tr.bank[:, k] += vector - tr.told[i, :, k]
+    tr.told[i, :, :k] = info
+    tr.told[i, :, k] = vector
+
+
+@njit(cache=True)
+def condition_on_rate(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int) -> None:
+    """Give a new track what its first range rate tells of the velocity."""
+    n = tr.x.shape[1]
+    zhat = np.empty(7)
+    H = np.zeros((7, n))
+    h6 = np.empty((7, 6))
+    y = np.empty(7)
+    S = np.empty((7, 7))
+    PHt = np.empty((n, 7))
+    mask = np.empty(7, np.int64)
+    work = np.zeros((2, 3))
+    mask[0] = 3
+    linearise(tr.x[i], s.d, k, 0.0, look, sensor, zhat, H, h6, work)
+    innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, 1, y, S, PHt, s.d, sensor.constant[TIME])
+    apply_update(tr.x[i], tr.P[i], y, S, PHt, 1, n - s.n_constant)

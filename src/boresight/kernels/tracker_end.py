@@ -1,0 +1,108 @@
+"""Which tracks are shown, which end, and which two have become one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from boresight.kernels.tracker import HIDDEN, STATIC, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
+from boresight.kernels.tracker_begin import save_lesson
+
+
+@njit(cache=True)
+def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look) -> None:
+    """Show the tracks that are probably moving targets within the range for which the sensor answers."""
+    last = len(look.dt)
+    for i in range(tr.live[0]):
+        gap = 0.0
+        for a in range(s.d):
+            gap += (tr.x[i, a] - look.sensor_position[last, a]) ** 2
+        target = tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN]
+        if tr.life[i, 2] > 0.0:
+            if sensor.report_range == s.farthest_report and gap > (1.1 * sensor.report_range) ** 2:
+                save_lesson(tr, i, s)
+                tr.life[i, 2] = 0.0
+        elif target > s.show_above and gap < sensor.report_range**2 and stands_apart(tr, i, s):
+            tr.life[i, 2] = 1.0
+
+
+@njit(cache=True)
+def stands_apart(tr: Tracks, i: int, s: Settings) -> bool:
+    """Whether no shown track is so near that `i` may be another part of the same object."""
+    for j in range(tr.live[0] if s.apart > 0.0 else 0):
+        if tr.life[j, 2] > 0.0 and j != i:
+            gap = 0.0
+            for a in range(s.d):
+                gap += (tr.x[i, a] - tr.x[j, a]) ** 2
+            if gap < s.apart**2:
+                return False
+    return True
+
+
+@njit(cache=True)
+def end_and_merge(tr: Tracks, s: Settings, merging: bool, start: IntArray) -> None:
+    """Drop tracks that are probably nothing, and the weaker of two that have become one.
+
+    `start` is the candidate list of this look: a track whose gate holds many detections needs the more weight to live,
+    since the next one in it will be its own the less probably.
+    """
+    n_tracks = tr.live[0]
+    keep = np.ones(n_tracks, np.bool_)
+    for i in range(n_tracks):
+        w = tr.weight[i]
+        target = w[VISIBLE] + w[HIDDEN]
+        crowd = start[i + 1] - start[i] if i + 1 < len(start) else 1
+        if target + w[STATIC] < s.delete_below * max(1, crowd):
+            save_lesson(tr, i, s)
+            keep[i] = False
+        elif target < s.hide_below:
+            save_lesson(tr, i, s)
+            tr.life[i, 2] = 0.0
+    order = np.argsort(tr.x[:n_tracks, 0])  # neighbours lie next to each other in the east
+    for a in range(n_tracks if merging else 0):
+        i = order[a]
+        for b in range(a + 1, n_tracks):
+            j = order[b]
+            if tr.x[j, 0] - tr.x[i, 0] > s.merge_distance or not keep[i]:
+                break
+            if keep[j] and are_one(tr, i, j, s):
+                weaker = j if rank(tr, i) >= rank(tr, j) else i
+                keep[weaker] = False
+                save_lesson(tr, weaker, s)
+    at = 0
+    for i in range(n_tracks):
+        if keep[i]:
+            if at != i:
+                tr.birth[at] = tr.birth[i]
+                tr.x[at] = tr.x[i]
+                tr.P[at] = tr.P[i]
+                tr.weight[at] = tr.weight[i]
+                tr.anchor[at] = tr.anchor[i]
+                tr.anchor_P[at] = tr.anchor_P[i]
+                tr.life[at] = tr.life[i]
+                tr.told[at] = tr.told[i]
+                tr.heard[at] = tr.heard[i]
+            at += 1
+    tr.live[0] = at
+
+
+@njit(cache=True)
+def are_one(tr: Tracks, i: int, j: int, s: Settings) -> bool:
+    """Whether two tracks, each hit more than once, are at one place and move alike."""
+    if tr.life[i, 3] < 2.0 or tr.life[j, 3] < 2.0:
+        return False
+    gap = 0.0
+    speed = 0.0
+    spread = 0.0
+    for a in range(s.d):
+        v = s.d + a
+        gap += (tr.x[i, a] - tr.x[j, a]) ** 2
+        speed += (tr.x[i, v] - tr.x[j, v]) ** 2
+        spread += tr.P[i, v, v] + tr.P[j, v, v]
+    return bool(gap <= s.merge_distance**2 and speed <= 4.0 * spread)
+
+
+@njit(cache=True)
+def rank(tr: Tracks, i: int) -> float:
+    """Which of two tracks that are one should stay: a shown one, then the more probable, then the older."""
+    return float(tr.life[i, 2] + tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN] - 1e-9 * tr.birth[i])

@@ -1,0 +1,214 @@
+"""How a track moves between looks, and how a detection conditions it: prediction, linearisation, innovation, update."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from boresight.kernels.measurement import measure, wrap
+from boresight.kernels.registration import N_PARAMETERS, sensitivity
+from boresight.kernels.tracker import HIDDEN, NOTHING, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
+from boresight.types.sensor import FloatArray
+
+
+@njit(cache=True)
+def predict_all(tr: Tracks, s: Settings, t: float) -> None:
+    """Predict every track to time `t`: state (exact white-acceleration CV), biases, hypotheses."""
+    dt = t - tr.time[0]
+    tr.time[0] = t
+    if dt <= 0.0:
+        return
+    n = tr.x.shape[1]
+    d = s.d
+    q3, q2, q1 = s.q * dt**3 / 3.0, s.q * dt**2 / 2.0, s.q * dt
+    n_bias = n - 2 * d
+    decay = np.empty(n_bias)
+    for k in range(n_bias):
+        decay[k] = math.exp(-dt / s.bias_tau[k])
+    p_survive = math.exp(-dt / s.survival_time)
+    rate = 1.0 / s.hide_time + 1.0 / s.show_time
+    settle = 1.0 - math.exp(-dt * rate)
+    to_hidden = settle / (s.hide_time * rate)
+    to_visible = settle / (s.show_time * rate)
+    for i in range(tr.live[0]):
+        x = tr.x[i]
+        P = tr.P[i]
+        for a in range(d):
+            x[a] += dt * x[d + a]
+        for a in range(d):  # rows: F P
+            for j in range(n):
+                P[a, j] += dt * P[d + a, j]
+        for a in range(d):  # columns: (F P) F'
+            for j in range(n):
+                P[j, a] += dt * P[j, d + a]
+        for k in range(n_bias):
+            b = 2 * d + k
+            x[b] *= decay[k]
+            for j in range(n):
+                P[b, j] *= decay[k]
+            for j in range(n):
+                P[j, b] *= decay[k]
+            P[b, b] += s.bias_sigma[k] ** 2 * (1.0 - decay[k] ** 2)
+        for a in range(d):
+            P[a, a] += q3
+            P[d + a, d + a] += q1
+            P[a, d + a] += q2
+            P[d + a, a] += q2
+            tr.anchor_P[i, a, a] += s.static_q * dt
+        w = tr.weight[i]
+        v, h = w[VISIBLE] * p_survive, w[HIDDEN] * p_survive
+        w[NOTHING] += (1.0 - p_survive) * (w[VISIBLE] + w[HIDDEN])
+        w[VISIBLE] = v * (1.0 - to_hidden) + h * to_visible
+        w[HIDDEN] = h * (1.0 - to_visible) + v * to_hidden
+
+
+@njit(cache=True)
+def linearise(
+    x: FloatArray,
+    d: int,
+    k: int,
+    dt: float,
+    look: Look,
+    sensor: SensorTable,
+    z: FloatArray,
+    H: FloatArray,
+    h6: FloatArray,
+    work: FloatArray,
+) -> None:
+    """Fill `z` (7,) and `H` (7, n) for a track's state `x` seen with the pose of detection `k`, `dt` after the look.
+
+    `work` (2, 3) holds position and velocity; zero in the components that the state lacks.
+    """
+    position, velocity = work[0], work[1]
+    for a in range(d):
+        position[a] = x[a] + dt * x[d + a]
+        velocity[a] = x[d + a]
+    measure(position, velocity, look.sensor_position[k], look.sensor_velocity[k], look.enu_from_sensor[k], z, h6)
+    n = len(x)
+    for c in range(7):
+        for a in range(d):
+            H[c, a] = h6[c, a]
+            H[c, d + a] = h6[c, 3 + a] + dt * h6[c, a]
+        for j in range(2 * d, n):
+            H[c, j] = 0.0
+        b = sensor.bias[c]
+        if b >= 0:
+            H[c, b] = 1.0
+    if sensor.registers:
+        S = np.empty((7, N_PARAMETERS))
+        sensitivity(z, h6, velocity - look.sensor_velocity[k], S)
+        for p in range(N_PARAMETERS):
+            if sensor.constant[p] >= 0:
+                for c in range(7):
+                    H[c, sensor.constant[p]] = S[c, p]
+    if n > 2 * d:
+        for c in range(7):
+            for j in range(2 * d, n):
+                z[c] += H[c, j] * x[j]
+
+
+@njit(cache=True)
+def components(z: FloatArray, d: int, mask: IntArray) -> int:
+    """Fill `mask` with the measured components that the state can explain and return how many there are."""
+    m = 0
+    for c in range(7):
+        if math.isfinite(z[c]) and not (d == 2 and (c == 2 or c == 6)):
+            mask[m] = c
+            m += 1
+    return m
+
+
+@njit(cache=True)
+def innovation(
+    P: FloatArray,
+    zhat: FloatArray,
+    H: FloatArray,
+    z: FloatArray,
+    R: FloatArray,
+    mask: IntArray,
+    m: int,
+    y: FloatArray,
+    S: FloatArray,
+    PHt: FloatArray,
+    d: int,
+    lag: int,
+) -> tuple[float, float]:
+    """Fill `y`, the Cholesky factor of S in `S` and P H' in `PHt`; return (NIS, log determinant of S).
+
+    `lag` is the state index of the sensor's time offset (-1: none): it multiplies the velocity, and where both are
+    uncertain their product adds to mean and covariance (the second-order terms, exact for a product of Gaussians).
+    """
+    n = P.shape[0]
+    for i in range(m):
+        c = mask[i]
+        y[i] = z[c] - zhat[c]
+        if lag >= 0:
+            for a in range(d):
+                y[i] += H[c, a] * P[d + a, lag]
+        if c == 1 or c == 2:
+            y[i] = wrap(y[i])
+        for a in range(n):
+            acc = 0.0
+            for b in range(n):
+                acc += P[a, b] * H[c, b]
+            PHt[a, i] = acc
+    for i in range(m):
+        for j in range(i + 1):
+            acc = R[mask[i], mask[j]]
+            for a in range(n):
+                acc += H[mask[i], a] * PHt[a, j]
+            if lag >= 0:
+                for a in range(d):
+                    for b in range(d):
+                        product = P[d + a, d + b] * P[lag, lag] + P[d + a, lag] * P[d + b, lag]
+                        acc += H[mask[i], a] * product * H[mask[j], b]
+            S[i, j] = acc
+    # in-place Cholesky and forward substitution
+    nis = 0.0
+    logdet = 0.0
+    for i in range(m):
+        for j in range(i + 1):
+            acc = S[i, j]
+            for k in range(j):
+                acc -= S[i, k] * S[j, k]
+            if i == j:
+                S[i, i] = math.sqrt(max(acc, 1e-300))
+            else:
+                S[i, j] = acc / S[j, j]
+        logdet += 2.0 * math.log(S[i, i])
+    for i in range(m):
+        acc = y[i]
+        for k in range(i):
+            acc -= S[i, k] * y[k]
+        y[i] = acc / S[i, i]  # whitened
+        nis += y[i] * y[i]
+    return nis, logdet
+
+
+@njit(cache=True)
+def apply_update(
+    x: FloatArray, P: FloatArray, y: FloatArray, L: FloatArray, PHt: FloatArray, m: int, considered: int
+) -> None:
+    """Condition (x, P) on whitened innovations `y` with S = L L': P -= W W', W = P H' L^-T, exactly symmetric.
+
+    States from `considered` on count with their covariance but learn nothing (Schmidt 1966): n for none.
+    """
+    n = len(x)
+    for i in range(m):
+        for a in range(n):
+            acc = PHt[a, i]
+            for k in range(i):
+                acc -= PHt[a, k] * L[i, k]
+            PHt[a, i] = acc / L[i, i]
+    for a in range(considered):
+        for i in range(m):
+            x[a] += PHt[a, i] * y[i]
+    for a in range(n):
+        for b in range(min(a + 1, considered)):
+            acc = P[a, b]
+            for i in range(m):
+                acc -= PHt[a, i] * PHt[b, i]
+            P[a, b] = acc
+            P[b, a] = acc
