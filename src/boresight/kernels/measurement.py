@@ -6,10 +6,27 @@ import math
 
 from numba import njit
 
+from boresight.kernels.options import LEAF
 from boresight.types.sensor import FloatArray
 
 
-@njit(cache=True)
+@njit(**LEAF)
+def measure_axes(
+    position: FloatArray, sensor_position: FloatArray, enu_from_sensor: FloatArray, z: FloatArray, H: FloatArray
+) -> None:
+    """Fill only the position in the sensor's axes, z[4:7], and its Jacobian H[4:7], as `measure` does."""
+    R = enu_from_sensor
+    p0 = position[0] - sensor_position[0]
+    p1 = position[1] - sensor_position[1]
+    p2 = position[2] - sensor_position[2]
+    for i in range(3):
+        z[4 + i] = R[0, i] * p0 + R[1, i] * p1 + R[2, i] * p2
+        for j in range(3):
+            H[4 + i, j] = R[j, i]
+            H[4 + i, 3 + j] = 0.0
+
+
+@njit(cache=True, _nrt=False)
 def measure(
     position: FloatArray,
     velocity: FloatArray,
@@ -30,15 +47,14 @@ def measure(
     and its Jacobian are not defined (they are set to zero there, as everything is at zero range).
     """
     R = enu_from_sensor
+    measure_axes(position, sensor_position, R, z, H)
+    d0, d1, d2 = z[4], z[5], z[6]
     p0 = position[0] - sensor_position[0]
     p1 = position[1] - sensor_position[1]
     p2 = position[2] - sensor_position[2]
     v0 = velocity[0] - sensor_velocity[0]
     v1 = velocity[1] - sensor_velocity[1]
     v2 = velocity[2] - sensor_velocity[2]
-    d0 = R[0, 0] * p0 + R[1, 0] * p1 + R[2, 0] * p2
-    d1 = R[0, 1] * p0 + R[1, 1] * p1 + R[2, 1] * p2
-    d2 = R[0, 2] * p0 + R[1, 2] * p1 + R[2, 2] * p2
     rho2 = d0 * d0 + d1 * d1
     rho = math.sqrt(rho2)
     r2 = rho2 + d2 * d2
@@ -46,9 +62,6 @@ def measure(
     z[0] = r
     z[1] = math.atan2(d0, d1)
     z[2] = math.atan2(d2, rho)
-    z[4] = d0
-    z[5] = d1
-    z[6] = d2
     i_r = 1.0 / r if r > 0.0 else 0.0
     i_rho2 = 1.0 / rho2 if rho2 > 0.0 else 0.0
     rate = (p0 * v0 + p1 * v1 + p2 * v2) * i_r
@@ -64,10 +77,7 @@ def measure(
     for j in range(3):
         H[1, j] = R[j, 0] * a0 + R[j, 1] * a1
         H[2, j] = R[j, 0] * e0 + R[j, 1] * e1 + R[j, 2] * e2
-        H[4, j] = R[j, 0]
-        H[5, j] = R[j, 1]
-        H[6, j] = R[j, 2]
-        for i in (0, 1, 2, 4, 5, 6):
+        for i in range(3):
             H[i, 3 + j] = 0.0
     H[0, 0] = p0 * i_r
     H[0, 1] = p1 * i_r
@@ -81,7 +91,7 @@ def measure(
     return rho
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def wrap(angle: float) -> float:
     """Wrap an angle to [-π, π) (rad)."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))

@@ -12,13 +12,14 @@ import math
 import numpy as np
 from numba import njit
 
+from boresight.kernels.options import LEAF
 from boresight.types.sensor import FloatArray
 
 TIME, RANGE, SCALE, AZIMUTH, ELEVATION = 0, 1, 2, 3, 4
 N_PARAMETERS = 5
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def sensitivity(z: FloatArray, h6: FloatArray, closing: FloatArray, S: FloatArray) -> None:
     """Fill `S` (7, 5): how the components of a measurement `z` (7,) change with the sensor's constant errors.
 

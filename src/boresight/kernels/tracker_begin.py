@@ -22,8 +22,9 @@ from boresight.kernels.tracker import (
     Settings,
     Tracks,
 )
-from boresight.kernels.tracker_place import component_covariance, fix_sensitivity, position_fix
+from boresight.kernels.tracker_place import Places, fix_sensitivity
 from boresight.kernels.tracker_state import apply_update, innovation, linearise
+from boresight.kernels.tracker_workroom import workroom
 from boresight.types.sensor import FloatArray
 
 
@@ -37,14 +38,11 @@ def begin(
     owner: IntArray,
     row_of_col: IntArray,
     usable: NDArray[np.bool_],
+    at: Places,
 ) -> None:
     """Begin a track at every detection with a position that no track took."""
     d = s.d
     n = tr.x.shape[1]
-    J = np.zeros((3, 3))
-    fix = np.empty(3)
-    mask = np.empty(3, np.int64)
-    R = np.zeros((3, 3))
     if tr.live[1] == 0:  # a first look full of targets must not pass for clutter: take them at their number
         spare = 0.0
         for k in range(len(look.dt)):
@@ -54,9 +52,9 @@ def begin(
     expected = tr.undetected[0] * sensor.p_detection
     tr.undetected[0] += s.birth_rate - expected
     for k in range(len(look.dt)):
-        if not usable[k] or row_of_col[k] >= 0 or position_fix(look, k, s, sensor, fix, J, mask) == 0:
+        if row_of_col[k] >= 0 or not at.there[k]:
             continue
-        component_covariance(look, k, s, sensor, mask, R)
+        fix, J, R, mask = at.fix[k], at.J[k], at.R[k], at.mask[k]
         i = tr.live[0]
         tr.live[0] += 1
         x, P = tr.x[i], tr.P[i]
@@ -157,7 +155,9 @@ def apply_constants(
     n = tr.x.shape[1]
     first = n - s.n_constant
     x, P = tr.x[i], tr.P[i]
-    C = fix_sensitivity(look, k, sensor, fix, J, mask, np.zeros(3))
+    room = workroom(n)
+    fix_sensitivity(look, k, fix, J, mask, (0.0, 0.0, 0.0), room)
+    C = room.C
     full = np.zeros((d, n))
     for p in range(len(sensor.constant)):
         j = sensor.constant[p]
@@ -205,15 +205,8 @@ def save_lesson(tr: Tracks, i: int, s: Settings) -> None:
 def condition_on_rate(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int) -> None:
     """Give a new track what its first range rate tells of the velocity."""
     n = tr.x.shape[1]
-    zhat = np.empty(7)
-    H = np.zeros((7, n))
-    h6 = np.empty((7, 6))
-    y = np.empty(7)
-    S = np.empty((7, 7))
-    PHt = np.empty((n, 7))
-    mask = np.empty(7, np.int64)
-    work = np.zeros((2, 3))
-    mask[0] = 3
-    linearise(tr.x[i], s.d, k, 0.0, look, sensor, zhat, H, h6, work)
-    innovation(tr.P[i], zhat, H, look.z[k], look.R[k], mask, 1, y, S, PHt, s.d, sensor.constant[TIME])
-    apply_update(tr.x[i], tr.P[i], y, S, PHt, 1, n - s.n_constant)
+    room = workroom(n)
+    room.mask[0] = 3
+    linearise(tr.x[i], s.d, k, 0.0, look, sensor, 1, room)
+    innovation(tr.P[i], look.z[k], look.R[k], 1, room, s.d, sensor.constant[TIME])
+    apply_update(tr.x[i], tr.P[i], 1, room, n - s.n_constant)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from boresight.kernels.options import LEAF
 from boresight.kernels.tracker import HIDDEN, STATIC, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_begin import save_lesson
 
@@ -26,7 +27,7 @@ def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look) -> None:
             tr.life[i, 2] = 1.0
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def stands_apart(tr: Tracks, i: int, s: Settings) -> bool:
     """Whether no shown track is so near that `i` may be another part of the same object."""
     for j in range(tr.live[0] if s.apart > 0.0 else 0):
@@ -86,7 +87,7 @@ def end_and_merge(tr: Tracks, s: Settings, merging: bool, start: IntArray) -> No
     tr.live[0] = at
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def are_one(tr: Tracks, i: int, j: int, s: Settings) -> bool:
     """Whether two tracks, each hit more than once, are at one place and move alike."""
     if tr.life[i, 3] < 2.0 or tr.life[j, 3] < 2.0:
@@ -102,7 +103,7 @@ def are_one(tr: Tracks, i: int, j: int, s: Settings) -> bool:
     return bool(gap <= s.merge_distance**2 and speed <= 4.0 * spread)
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def rank(tr: Tracks, i: int) -> float:
     """Which of two tracks that are one should stay: a shown one, then the more probable, then the older."""
     return float(tr.life[i, 2] + tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN] - 1e-9 * tr.birth[i])

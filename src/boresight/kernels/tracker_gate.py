@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from boresight.kernels.options import LEAF
 from boresight.kernels.registration import TIME
 from boresight.kernels.tracker import (
     AZIMUTH_BINS,
@@ -22,20 +23,21 @@ from boresight.kernels.tracker import (
     Settings,
     Tracks,
 )
-from boresight.kernels.tracker_place import component_covariance, fix_sensitivity, position_fix, volume_of
+from boresight.kernels.tracker_place import Places, fix_sensitivity, volume_of
 from boresight.kernels.tracker_state import components, innovation, linearise
+from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
 LOG_2PI = math.log(2.0 * math.pi)
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def azimuth_bin(azimuth: float) -> int:
     """Return the clutter-map bin of an azimuth (rad)."""
     return int((azimuth + math.pi) / (2.0 * math.pi) * AZIMUTH_BINS) % AZIMUTH_BINS
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def clutter_density(tr: Tracks, s: Settings, sensor: SensorTable, z: FloatArray, mask: IntArray, m: int) -> float:
     """Expected false detections per unit volume of the measured components around `z`, as learned so far."""
     known = tr.clutter[sensor.number]
@@ -111,51 +113,44 @@ def learn_clutter(
         known[b] = max(known[b], floor / AZIMUTH_BINS)
 
 
-@njit(cache=True)
-def fix_all(
-    s: Settings, sensor: SensorTable, look: Look, usable: NDArray[np.bool_], fixes: FloatArray
+@njit(**LEAF)
+def spread_of(
+    s: Settings, sensor: SensorTable, look: Look, usable: NDArray[np.bool_], at: Places, room: Workroom
 ) -> tuple[float, float]:
-    """Fill the world positions of all detections; return their largest variance (m², bias included) and largest |dt|.
+    """Return the largest variance (m², bias included) of the detections' world positions and the largest |dt|.
 
     The variance is infinite where a detection gives no position: then nearness cannot be told beforehand.
     """
     spread = 0.0
     dt_high = 0.0
-    R = np.empty((3, 3))
-    J = np.zeros((3, 3))
-    mask = np.empty(3, np.int64)
     for k in range(len(look.dt)):
         if not usable[k]:
             continue
-        if not sensor.ranging or position_fix(look, k, s, sensor, fixes[k], J, mask) == 0:
+        if not at.there[k]:
             return np.inf, 0.0
-        component_covariance(look, k, s, sensor, mask, R)
-        total = 0.0  # the trace of J R J'
+        total = 0.0
+        for a in range(s.d):
+            total += at.covariance[k, a, a]
         for e in range(3):
-            for f in range(3):
-                for a in range(s.d):
-                    total += J[a, e] * R[e, f] * J[a, f]
-        for e in range(3):
-            b = sensor.bias[mask[e]]
+            b = sensor.bias[at.mask[k, e]]
             if b >= 0:
-                total += (J[0, e] ** 2 + J[1, e] ** 2 + J[2, e] ** 2) * s.bias_sigma[b - 2 * s.d] ** 2
-        total += constant_spread(look, k, s, sensor, fixes[k], J, mask)
+                total += (at.J[k, 0, e] ** 2 + at.J[k, 1, e] ** 2 + at.J[k, 2, e] ** 2) * s.bias_sigma[b - 2 * s.d] ** 2
+        total += constant_spread(look, k, s, sensor, at, room)
         spread = max(spread, total)
         dt_high = max(dt_high, abs(look.dt[k]))
     return spread, dt_high
 
 
-@njit(cache=True)
-def constant_spread(
-    look: Look, k: int, s: Settings, sensor: SensorTable, fix: FloatArray, J: FloatArray, mask: IntArray
-) -> float:
+@njit(**LEAF)
+def constant_spread(look: Look, k: int, s: Settings, sensor: SensorTable, at: Places, room: Workroom) -> float:
     """Variance (m²) that the declared constant errors of the sensor may add to a detection's world position."""
     total = 0.0
     if not sensor.registers:
         return total
     # the target's own motion is not known yet: a fast one across both axes stands for it
-    fast = np.full(3, 3.0 * s.speed_sigma)
-    G = fix_sensitivity(look, k, sensor, fix, J, mask, fast)
+    fast = 3.0 * s.speed_sigma
+    fix_sensitivity(look, k, at.fix[k], at.J[k], at.mask[k], (fast, fast, fast), room)
+    G = room.C
     for p in range(len(sensor.constant)):
         j = sensor.constant[p]
         if j >= 0:
@@ -163,7 +158,7 @@ def constant_spread(
     return total
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def reach_of(tr: Tracks, i: int, s: Settings, spread: float, dt: float, gate: float) -> float:
     """Distance (m) beyond which no detection can be in the gate of track `i`: NIS >= d² / trace(S), twice over."""
     total = spread
@@ -182,7 +177,9 @@ def gate_all(
     sensor: SensorTable,
     look: Look,
     usable: NDArray[np.bool_],
+    at: Places,
     p_d: FloatArray,
+    room: Workroom,
     fate: IntArray,
     owner: IntArray,
     nis_of: FloatArray,
@@ -190,29 +187,19 @@ def gate_all(
     """Return the candidate list (start, column, cost, NIS, log(likelihood / clutter density)) of all tracks."""
     n_tracks = tr.live[0]
     m = len(look.dt)
-    n = tr.x.shape[1]
     start = np.zeros(n_tracks + 1, np.int64)
-    room = max(64, 4 * (n_tracks + m))
-    column = np.empty(room, np.int64)
-    cost = np.empty(room)
-    distance = np.empty(room)
-    loglik = np.empty(room)
-    zhat = np.empty(7)
-    H = np.zeros((7, n))
-    h6 = np.empty((7, 6))
-    y = np.empty(7)
-    S = np.empty((7, 7))
-    PHt = np.empty((n, 7))
-    mask = np.empty(7, np.int64)
-    work = np.zeros((2, 3))
+    size = max(64, 4 * (n_tracks + m))
+    column = np.empty(size, np.int64)
+    cost = np.empty(size)
+    distance = np.empty(size)
+    loglik = np.empty(size)
     near = np.full(m, np.inf)
     log_density = np.empty(m)
     most = log_densities(tr, s, sensor, look, log_density)
-    fixes = np.zeros((m, 3))
-    spread, dt_high = fix_all(s, sensor, look, usable, fixes)
+    spread, dt_high = spread_of(s, sensor, look, usable, at, room)
     near_only = math.isfinite(spread)
-    order = np.argsort(fixes[:, 0]) if near_only else np.arange(m)
-    east, north = fixes[order, 0], fixes[order, 1]
+    order = np.argsort(at.fix[:, 0]) if near_only else np.arange(m)
+    east, north = at.fix[order, 0], at.fix[order, 1]
     used = 0
     for i in range(n_tracks):
         start[i] = used
@@ -222,28 +209,27 @@ def gate_all(
         p_there = max(min(there, 1.0 - 1e-9), s.doubt)
         log_hit = math.log(p_there * p_d[i])
         log_miss = math.log(1.0 - p_there * p_d[i])
-        last_pose = -1
+        last_pose, last_kind = -1, 0
         first, last = 0, m
         reach = np.inf
         if near_only:
             reach = reach_of(tr, i, s, spread, dt_high, s.gates[most])
-            first = np.searchsorted(east, tr.x[i, 0] - reach)
-            last = np.searchsorted(east, tr.x[i, 0] + reach, side="right")
-        for at in range(first, last):
-            if near_only and abs(north[at] - tr.x[i, 1]) > reach:
+            first = place_in(east, tr.x[i, 0] - reach)
+            last = place_in(east, tr.x[i, 0] + reach)
+        for near_by in range(first, last):
+            if near_only and abs(north[near_by] - tr.x[i, 1]) > reach:
                 continue
-            k = order[at]
+            k = order[near_by]
             if not usable[k]:
                 continue
-            if last_pose < 0 or look.dt[k] != look.dt[last_pose]:
-                linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, zhat, H, h6, work)
-                last_pose = k
-            c = components(look.z[k], s.d, mask)
+            c = components(look.z[k], s.d, room.mask)
             if c == 0:
                 continue
-            nis, logdet = innovation(
-                tr.P[i], zhat, H, look.z[k], look.R[k], mask, c, y, S, PHt, s.d, sensor.constant[TIME]
-            )
+            kind = kind_of(room.mask, c)
+            if kind != last_kind or look.dt[k] != look.dt[last_pose]:
+                linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, c, room)
+                last_pose, last_kind = k, kind
+            nis, logdet = innovation(tr.P[i], look.z[k], look.R[k], c, room, s.d, sensor.constant[TIME])
             if nis < near[k]:
                 near[k] = nis
                 if nis > s.gates[c]:
@@ -256,10 +242,10 @@ def gate_all(
             value = log_miss - (log_hit + ll)
             if fate[k] == GATED:
                 fate[k] = UNASSOCIATED
-            if used == room:
-                room *= 2
-                column = grown_int(column, room)
-                cost, distance, loglik = grown(cost, room), grown(distance, room), grown(loglik, room)
+            if used == size:
+                size *= 2
+                column = grown_int(column, size)
+                cost, distance, loglik = grown(cost, size), grown(distance, size), grown(loglik, size)
             column[used] = k
             cost[used] = value
             distance[used] = nis
@@ -267,6 +253,28 @@ def gate_all(
             used += 1
     start[n_tracks] = used
     return start, column[:used], cost[:used], distance[:used], loglik[:used]
+
+
+@njit(**LEAF)
+def kind_of(mask: IntArray, count: int) -> int:
+    """Return one number for the set of the `count` components in `mask`, not 0."""
+    bits = 0
+    for e in range(count):
+        bits |= 1 << mask[e]
+    return bits
+
+
+@njit(**LEAF)
+def place_in(ascending: FloatArray, value: float) -> int:
+    """Return how many of the ascending values lie below `value`."""
+    first, last = 0, len(ascending)
+    while first < last:
+        middle = (first + last) // 2
+        if ascending[middle] < value:
+            first = middle + 1
+        else:
+            last = middle
+    return first
 
 
 @njit(cache=True)

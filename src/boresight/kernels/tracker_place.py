@@ -3,32 +3,52 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from boresight.kernels.measurement import measure
+from boresight.kernels.options import LEAF
 from boresight.kernels.registration import N_PARAMETERS, sensitivity
 from boresight.kernels.tracker import IntArray, Look, SensorTable, Settings
+from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
 
-@njit(cache=True)
-def coverage_of(z: FloatArray, sensor: SensorTable, margin: float) -> bool:
-    """Whether a direction and range (z[0:3], sensor axes) lies within the declared coverage, widened by `margin`."""
+class Places(NamedTuple):
+    """Where in the world the detections of a look lie, if they say so."""
+
+    there: NDArray[np.bool_]  # (m,) whether a detection gives a position
+    mask: IntArray  # (m, 3) the components that give it
+    fix: FloatArray  # (m, 3) m, world ENU
+    J: FloatArray  # (m, 3, 3) its Jacobian by the components
+    R: FloatArray  # (m, 3, 3) white covariance of the components
+    covariance: FloatArray  # (m, 3, 3) m², white part, world ENU
+
+
+@njit(**LEAF)
+def within(range_m: float, azimuth: float, elevation: float, sensor: SensorTable, margin: float) -> bool:
+    """Whether range (m) and direction (rad, sensor axes) lie within the declared coverage, widened by `margin`.
+
+    NaN is not looked at.
+    """
     slack_r = margin * max(50.0, 0.02 * sensor.range_high) if math.isfinite(sensor.range_high) else 0.0
-    if math.isfinite(z[0]) and not (sensor.range_low - slack_r <= z[0] <= sensor.range_high + slack_r):
+    if math.isfinite(range_m) and not (sensor.range_low - slack_r <= range_m <= sensor.range_high + slack_r):
         return False
     slack_a = margin * 0.035
-    if math.isfinite(z[1]) and sensor.azimuth_span < 2.0 * math.pi - 1e-9:
-        a = z[1] - sensor.azimuth_low + slack_a
+    if math.isfinite(azimuth) and sensor.azimuth_span < 2.0 * math.pi - 1e-9:
+        a = azimuth - sensor.azimuth_low + slack_a
         a -= 2.0 * math.pi * math.floor(a / (2.0 * math.pi))
         if a > sensor.azimuth_span + 2.0 * slack_a:
             return False
-    return not math.isfinite(z[2]) or sensor.elevation_low - slack_a <= z[2] <= sensor.elevation_high + slack_a
+    return (
+        not math.isfinite(elevation) or sensor.elevation_low - slack_a <= elevation <= sensor.elevation_high + slack_a
+    )
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def volume_of(mask: IntArray, m: int, sensor: SensorTable, range_high: float, d: int, speed: float) -> float:
     """Volume of the coverage in the measured components: what clutter is uniform in (m, rad, m/s)."""
     r1, r2 = sensor.range_low, range_high
@@ -54,7 +74,7 @@ def volume_of(mask: IntArray, m: int, sensor: SensorTable, range_high: float, d:
     return volume
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def position_fix(
     look: Look, k: int, s: Settings, sensor: SensorTable, fix: FloatArray, J: FloatArray, mask: IntArray
 ) -> int:
@@ -94,7 +114,7 @@ def position_fix(
     return 3
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def component_covariance(look: Look, k: int, s: Settings, sensor: SensorTable, mask: IntArray, R: FloatArray) -> None:
     """Fill the covariance (3, 3) of the components in `mask`; what is not measured has its prior spread."""
     for a in range(3):
@@ -111,47 +131,47 @@ def component_covariance(look: Look, k: int, s: Settings, sensor: SensorTable, m
 
 
 @njit(cache=True)
-def world_fix(
+def places_of(look: Look, s: Settings, sensor: SensorTable, usable: NDArray[np.bool_]) -> Places:
+    """Return where all usable detections of a look lie."""
+    m = len(look.dt)
+    there = np.zeros(m, np.bool_)
+    mask = np.zeros((m, 3), np.int64)
+    fix, J, R, cov = np.zeros((m, 3)), np.zeros((m, 3, 3)), np.zeros((m, 3, 3)), np.zeros((m, 3, 3))
+    for k in range(m if sensor.ranging else 0):
+        if not usable[k] or position_fix(look, k, s, sensor, fix[k], J[k], mask[k]) == 0:
+            continue
+        there[k] = True
+        component_covariance(look, k, s, sensor, mask[k], R[k])
+        for a in range(3):
+            j0, j1, j2 = J[k, a, 0], J[k, a, 1], J[k, a, 2]
+            r0 = j0 * R[k, 0, 0] + j1 * R[k, 1, 0] + j2 * R[k, 2, 0]
+            r1 = j0 * R[k, 0, 1] + j1 * R[k, 1, 1] + j2 * R[k, 2, 1]
+            r2 = j0 * R[k, 0, 2] + j1 * R[k, 1, 2] + j2 * R[k, 2, 2]
+            for b in range(3):
+                cov[k, a, b] = r0 * J[k, b, 0] + r1 * J[k, b, 1] + r2 * J[k, b, 2]
+    return Places(there, mask, fix, J, R, cov)
+
+
+@njit(**LEAF)
+def fix_sensitivity(
     look: Look,
     k: int,
-    s: Settings,
-    sensor: SensorTable,
     fix: FloatArray,
-    fix_R: FloatArray,
     J: FloatArray,
     mask: IntArray,
-    work: FloatArray,
-) -> bool:
-    """Fill a detection's world position (3,) and its white covariance (3, 3); False where it gives no position.
-
-    `work` is (3, 3).
-    """
-    if position_fix(look, k, s, sensor, fix, J, mask) == 0:
-        return False
-    component_covariance(look, k, s, sensor, mask, work)
+    velocity: tuple[float, float, float],
+    room: Workroom,
+) -> None:
+    """Fill `room.C` (3, 5): how the world position of detection `k` changes with the sensor's constant errors."""
+    moving = look.sensor_velocity[k]
     for a in range(3):
-        for b in range(3):
-            acc = 0.0
-            for e in range(3):
-                for f in range(3):
-                    acc += J[a, e] * work[e, f] * J[b, f]
-            fix_R[a, b] = acc
-    return True
-
-
-@njit(cache=True)
-def fix_sensitivity(
-    look: Look, k: int, sensor: SensorTable, fix: FloatArray, J: FloatArray, mask: IntArray, velocity: FloatArray
-) -> FloatArray:
-    """Return (3, 5): how the world position of detection `k` changes with the sensor's constant errors."""
-    z = np.empty(7)
-    h6 = np.empty((7, 6))
-    S = np.empty((7, N_PARAMETERS))
-    measure(fix, velocity, look.sensor_position[k], look.sensor_velocity[k], look.enu_from_sensor[k], z, h6)
-    sensitivity(z, h6, velocity - look.sensor_velocity[k], S)
-    out = np.zeros((3, N_PARAMETERS))
+        room.v[a] = velocity[a]
+    measure(fix, room.v, look.sensor_position[k], moving, look.enu_from_sensor[k], room.z, room.h6)
+    for a in range(3):
+        room.v[a] -= moving[a]
+    sensitivity(room.z, room.h6, room.v, room.errors)
     for a in range(3):
         for p in range(N_PARAMETERS):
+            room.C[a, p] = 0.0
             for e in range(3):
-                out[a, p] += J[a, e] * S[mask[e], p]
-    return out
+                room.C[a, p] += J[a, e] * room.errors[mask[e], p]

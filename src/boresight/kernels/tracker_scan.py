@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from boresight.kernels.assignment import assign_sparse
-from boresight.kernels.measurement import measure
+from boresight.kernels.options import LEAF
 from boresight.kernels.tracker import (
     NOTHING,
     OUTSIDE,
@@ -23,9 +23,10 @@ from boresight.kernels.tracker import (
 from boresight.kernels.tracker_begin import begin
 from boresight.kernels.tracker_end import end_and_merge, show
 from boresight.kernels.tracker_gate import gate_all, learn_clutter
-from boresight.kernels.tracker_place import coverage_of
+from boresight.kernels.tracker_place import places_of, within
 from boresight.kernels.tracker_state import predict_all
 from boresight.kernels.tracker_weigh import evidence, merged, take, weigh
+from boresight.kernels.tracker_workroom import workroom
 from boresight.types.sensor import FloatArray
 
 
@@ -46,16 +47,15 @@ def scan_step(
         fate[k] = UNASSOCIATED
         owner[k] = -1
         nis_of[k] = np.nan
-        usable[k] = coverage_of(look.z[k], sensor, 1.0)
+        usable[k] = within(look.z[k, 0], look.z[k, 1], look.z[k, 2], sensor, 1.0)
         if not usable[k]:
             fate[k] = OUTSIDE
+    at = places_of(look, s, sensor, usable)
     p_d = np.zeros(n_tracks)
-    z = np.empty(7)
-    h6 = np.empty((7, 6))
-    work = np.zeros((2, 3))
+    room = workroom(tr.x.shape[1])
     for i in range(n_tracks):
-        p_d[i] = detection_probability(tr, i, s, look, sensor, z, h6, work)
-    start, column, cost, distance, loglik = gate_all(tr, s, sensor, look, usable, p_d, fate, owner, nis_of)
+        p_d[i] = detection_probability(tr.x[i], s.d, look, sensor)
+    start, column, cost, distance, loglik = gate_all(tr, s, sensor, look, usable, at, p_d, room, fate, owner, nis_of)
     col_of_row = np.full(n_tracks, -1, np.int64)
     assign_sparse(start, column, cost, m, col_of_row)
     row_of_col = np.full(m, -1, np.int64)
@@ -93,31 +93,36 @@ def scan_step(
             fate[k] = UPDATED
             owner[k] = tr.birth[i]
             nis_of[k] = distance[e]
-            take(tr, i, s, sensor, look, k, evidence(i, start, column, loglik, row_of_col, p_d[i]), temper)
+            take(tr, i, s, sensor, look, k, at, room, evidence(i, start, column, loglik, row_of_col, p_d[i]), temper)
         elif not merged(tr, i, s, sensor, start, column, row_of_col):
             log_any = evidence(i, start, column, loglik, row_of_col, p_d[i])
             weigh(tr, i, log_any, log_any, temper)
     learn_clutter(tr, s, sensor, look, claims, row_of_col, usable)
     if sensor.ranging:
-        begin(tr, s, sensor, look, fate, owner, row_of_col, usable)
+        begin(tr, s, sensor, look, fate, owner, row_of_col, usable, at)
     if sensor.ranging:
         show(tr, s, sensor, look)
     end_and_merge(tr, s, sensor.ranging, start)
     tr.live[1] += 1
 
 
-@njit(cache=True)
-def detection_probability(
-    tr: Tracks, i: int, s: Settings, look: Look, sensor: SensorTable, z: FloatArray, h6: FloatArray, work: FloatArray
-) -> float:
-    """Probability that the sensor, looking once, reports a visible target where track `i` is; 0 outside coverage."""
+@njit(**LEAF)
+def detection_probability(x: FloatArray, d: int, look: Look, sensor: SensorTable) -> float:
+    """Probability that the sensor, looking once, reports a visible target with state `x`; 0 outside coverage."""
     m = len(look.dt)
-    for a in range(s.d):
-        work[0, a] = tr.x[i, a]
-    measure(work[0], work[1], look.sensor_position[m], look.sensor_velocity[m], look.enu_from_sensor[m], z, h6)
-    if not coverage_of(z, sensor, 0.0):
+    own, axes = look.sensor_position[m], look.enu_from_sensor[m]
+    p0, p1 = x[0] - own[0], x[1] - own[1]
+    p2 = (x[2] if d == 3 else 0.0) - own[2]
+    d0 = axes[0, 0] * p0 + axes[1, 0] * p1 + axes[2, 0] * p2
+    d1 = axes[0, 1] * p0 + axes[1, 1] * p1 + axes[2, 1] * p2
+    d2 = axes[0, 2] * p0 + axes[1, 2] * p1 + axes[2, 2] * p2
+    range_m = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    if not within(range_m, math.nan, math.nan, sensor, 0.0):  # angles only where needed: they cost most
+        return 0.0
+    azimuth = math.atan2(d0, d1) if sensor.azimuth_span < 2.0 * math.pi else math.nan
+    if not within(range_m, azimuth, math.atan2(d2, math.hypot(d0, d1)), sensor, 0.0):
         return 0.0
     p = sensor.p_detection
     if math.isfinite(sensor.fade_range):
-        p /= 1.0 + (z[0] / sensor.fade_range) ** 4
+        p /= 1.0 + (range_m / sensor.fade_range) ** 4
     return p

@@ -7,9 +7,11 @@ import math
 import numpy as np
 from numba import njit
 
-from boresight.kernels.measurement import measure, wrap
+from boresight.kernels.measurement import measure, measure_axes, wrap
+from boresight.kernels.options import LEAF
 from boresight.kernels.registration import N_PARAMETERS, sensitivity
 from boresight.kernels.tracker import HIDDEN, NOTHING, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
+from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
 
@@ -64,52 +66,47 @@ def predict_all(tr: Tracks, s: Settings, t: float) -> None:
         w[HIDDEN] = h * (1.0 - to_visible) + v * to_hidden
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def linearise(
-    x: FloatArray,
-    d: int,
-    k: int,
-    dt: float,
-    look: Look,
-    sensor: SensorTable,
-    z: FloatArray,
-    H: FloatArray,
-    h6: FloatArray,
-    work: FloatArray,
+    x: FloatArray, d: int, k: int, dt: float, look: Look, sensor: SensorTable, count: int, room: Workroom
 ) -> None:
-    """Fill `z` (7,) and `H` (7, n) for a track's state `x` seen with the pose of detection `k`, `dt` after the look.
+    """Fill `room.z` and `room.H` for a track's state `x` seen with the pose of detection `k`, `dt` after the look.
 
-    `work` (2, 3) holds position and velocity; zero in the components that the state lacks.
+    Only the `count` components in `room.mask` are sure to be filled. `room.sight` is zero where the state lacks one.
     """
-    position, velocity = work[0], work[1]
+    position, velocity, z, H, h6 = room.sight[0], room.sight[1], room.z, room.H, room.h6
     for a in range(d):
         position[a] = x[a] + dt * x[d + a]
         velocity[a] = x[d + a]
-    measure(position, velocity, look.sensor_position[k], look.sensor_velocity[k], look.enu_from_sensor[k], z, h6)
+    own, moving, axes = look.sensor_position[k], look.sensor_velocity[k], look.enu_from_sensor[k]
+    if room.mask[0] >= 4 and not sensor.registers:
+        measure_axes(position, own, axes, z, h6)
+    else:
+        measure(position, velocity, own, moving, axes, z, h6)
     n = len(x)
-    for c in range(7):
+    for e in range(count):
+        c = room.mask[e]
         for a in range(d):
             H[c, a] = h6[c, a]
             H[c, d + a] = h6[c, 3 + a] + dt * h6[c, a]
         for j in range(2 * d, n):
             H[c, j] = 0.0
-        b = sensor.bias[c]
-        if b >= 0:
-            H[c, b] = 1.0
+        if sensor.bias[c] >= 0:
+            H[c, sensor.bias[c]] = 1.0
     if sensor.registers:
-        S = np.empty((7, N_PARAMETERS))
-        sensitivity(z, h6, velocity - look.sensor_velocity[k], S)
+        for a in range(3):
+            room.v[a] = velocity[a] - moving[a]
+        sensitivity(z, h6, room.v, room.errors)
         for p in range(N_PARAMETERS):
             if sensor.constant[p] >= 0:
-                for c in range(7):
-                    H[c, sensor.constant[p]] = S[c, p]
-    if n > 2 * d:
-        for c in range(7):
-            for j in range(2 * d, n):
-                z[c] += H[c, j] * x[j]
+                for e in range(count):
+                    H[room.mask[e], sensor.constant[p]] = room.errors[room.mask[e], p]
+    for e in range(count):
+        for j in range(2 * d, n):
+            z[room.mask[e]] += H[room.mask[e], j] * x[j]
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def components(z: FloatArray, d: int, mask: IntArray) -> int:
     """Fill `mask` with the measured components that the state can explain and return how many there are."""
     m = 0
@@ -120,27 +117,19 @@ def components(z: FloatArray, d: int, mask: IntArray) -> int:
     return m
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def innovation(
-    P: FloatArray,
-    zhat: FloatArray,
-    H: FloatArray,
-    z: FloatArray,
-    R: FloatArray,
-    mask: IntArray,
-    m: int,
-    y: FloatArray,
-    S: FloatArray,
-    PHt: FloatArray,
-    d: int,
-    lag: int,
+    P: FloatArray, z: FloatArray, R: FloatArray, m: int, room: Workroom, d: int, lag: int
 ) -> tuple[float, float]:
-    """Fill `y`, the Cholesky factor of S in `S` and P H' in `PHt`; return (NIS, log determinant of S).
+    """Fill `y`, the Cholesky factor of S in `S` and P H' in `PHt` of `room`; return (NIS, log determinant of S).
+
+    Of the m components in `room.mask`, predicted by `linearise`.
 
     `lag` is the state index of the sensor's time offset (-1: none): it multiplies the velocity, and where both are
     uncertain their product adds to mean and covariance (the second-order terms, exact for a product of Gaussians).
     """
     n = P.shape[0]
+    zhat, H, mask, y, S, PHt = room.z, room.H, room.mask, room.y, room.S, room.PHt
     for i in range(m):
         c = mask[i]
         y[i] = z[c] - zhat[c]
@@ -187,15 +176,16 @@ def innovation(
     return nis, logdet
 
 
-@njit(cache=True)
-def apply_update(
-    x: FloatArray, P: FloatArray, y: FloatArray, L: FloatArray, PHt: FloatArray, m: int, considered: int
-) -> None:
-    """Condition (x, P) on whitened innovations `y` with S = L L': P -= W W', W = P H' L^-T, exactly symmetric.
+@njit(**LEAF)
+def apply_update(x: FloatArray, P: FloatArray, m: int, room: Workroom, considered: int) -> None:
+    """Condition (x, P) on whitened innovations with S = L L': P -= W W', W = P H' L^-T, exactly symmetric.
+
+    What `innovation` left in `room` is used up.
 
     States from `considered` on count with their covariance but learn nothing (Schmidt 1966): n for none.
     """
     n = len(x)
+    y, L, PHt = room.y, room.S, room.PHt
     for i in range(m):
         for a in range(n):
             acc = PHt[a, i]
