@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from boresight.stages.protocol import Belief, Note, Stage
-from boresight.tracking.output import Rows
-from boresight.tracking.run import believed, tick
+from boresight.tracking.output import Decisions, Rows
+from boresight.tracking.run import believed
 from boresight.tracking.run import run as run_tracker
-from boresight.tracking.tracker import Decision, Output, Tracker, TrackerState
+from boresight.tracking.tracker import Output, Tracker, TrackerState
 from boresight.types import FATES, NO_TRACK, DecisionRows, Fate, Scan
 
 DEPTH = 3  # stages that make values
@@ -52,16 +52,16 @@ def run(
     scans: Iterable[Scan],
     progress: Callable[[Scan], None] | None = None,
     watch: Callable[[TrackerState, Output], None] | None = None,
-) -> tuple[TrackerState, list[Rows], list[Decision], list[Note]]:
+) -> tuple[TrackerState, list[Rows], list[Decisions], list[Note]]:
     """Take looks in order of arrival through the stages and the tracker, to the end, as `tracking.run.run` does."""
     if not pipeline.stages:
         return *run_tracker(tracker, scans, progress=progress, watch=watch), []
     state, held = tracker.init(), pipeline.init()
     rows: list[Rows] = []
-    decisions: list[Decision] = []
+    decisions: list[Decisions] = []
     notes: list[Note] = []
     for scan in scans:
-        rows += tick(tracker, state, scan.t_recv).rows
+        rows += tracker.tick(state, scan.t_recv).rows
         held, ready, told = pipeline.step(held, scan, Belief(*believed(tracker, state)))
         notes += told
         for one in ready:

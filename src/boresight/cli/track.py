@@ -144,7 +144,10 @@ def track_recording(
             if tracker.plan.settings.n_constant:
                 diary.note(state)
 
-        state, rows, decisions, notes = stages_.run(before, tracker, scans, progress=tick, watch=watch)
+        looked_at = config.smoothing_lag is not None or tracker.plan.settings.n_constant > 0
+        state, rows, decisions, notes = stages_.run(
+            before, tracker, scans, progress=tick, watch=watch if looked_at else None
+        )
     seconds = time.perf_counter() - started
     tracks = track_rows(rows)
     fates = decision_rows(recording, tracker, decisions, state.names)
@@ -156,7 +159,7 @@ def track_recording(
         "counts": {
             "reports": len(recording.detections),
             "scans": len(scans),
-            "tracks": state.numbered,
+            "tracks": state.names.given,
             "rows": len(tracks),
             "fates": _fates(fates),
         },

@@ -6,7 +6,7 @@ import math
 
 from numba import njit
 
-from boresight.kernels.options import LEAF
+from boresight.kernels.options import BARE, LEAF
 from boresight.types.sensor import FloatArray
 
 
@@ -26,7 +26,7 @@ def measure_axes(
             H[4 + i, 3 + j] = 0.0
 
 
-@njit(cache=True, _nrt=False)
+@njit(**BARE)
 def measure(
     position: FloatArray,
     velocity: FloatArray,

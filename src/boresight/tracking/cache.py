@@ -8,9 +8,9 @@ from typing import Any
 
 def compiled() -> bool:
     """Return whether a compiled tracker kernel is in the cache (or nothing is compiled at all, or nobody can tell)."""
-    from boresight.kernels.tracker_scan import scan_step
+    from boresight.kernels.tracker_window import advance
 
-    kernel: Any = scan_step
+    kernel: Any = advance
 
     if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         return True

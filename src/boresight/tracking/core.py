@@ -1,4 +1,4 @@
-"""The in-order tracker: packs configuration for the kernel and steps it scan by scan."""
+"""Packs configuration and sensors for the kernel."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 from scipy.stats import chi2
 
 from boresight.kernels.registration import AZIMUTH, ELEVATION, N_PARAMETERS, RANGE, SCALE, TIME
-from boresight.kernels.tracker import AZIMUTH_BINS, Look, SensorTable, Settings, Tracks
-from boresight.kernels.tracker_scan import scan_step
+from boresight.kernels.tracker import AZIMUTH_BINS, SensorTable, Settings, Tracks
+from boresight.kernels.tracker_copies import EACH
+from boresight.kernels.tracker_looks import columns_of
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.types import N_COMPONENTS, Component, Sensor, SensorKind
 
@@ -31,6 +32,8 @@ class Plan(NamedTuple):
     settings: Settings
     sensors: tuple[SensorTable, ...]
     n_states: int
+    columns: SensorTable  # all sensors in one table, with a leading axis
+    empty: Tracks  # before the first look
 
 
 def make_plan(
@@ -118,7 +121,8 @@ def make_plan(
         lonely_bearings=config.lonely_bearings,
         clutter_memory=config.clutter_memory,
     )
-    return Plan(settings, tuple(tables), 2 * d + len(sigma))
+    n = 2 * d + len(sigma)
+    return Plan(settings, tuple(tables), n, columns_of(tuple(tables)), _empty_tracks(settings, tables, n))
 
 
 def _constants(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[int, float]]:
@@ -139,12 +143,11 @@ def _constants(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[i
     ]
 
 
-def empty_tracks(plan: Plan, capacity: int = 64) -> Tracks:
-    """Return a table without tracks."""
-    n = plan.n_states
-    k = plan.settings.n_constant
-    clutter = np.zeros((len(plan.sensors), AZIMUTH_BINS + 1))
-    for table in plan.sensors:
+def _empty_tracks(settings: Settings, sensors: Sequence[SensorTable], n: int, capacity: int = 64) -> Tracks:
+    """Return a table without tracks of `n` states."""
+    k = settings.n_constant
+    clutter = np.zeros((len(sensors), AZIMUTH_BINS + 1))
+    for table in sensors:
         clutter[table.number, :AZIMUTH_BINS] = table.clutter_per_scan / AZIMUTH_BINS
         clutter[table.number, AZIMUTH_BINS] = table.clutter_per_scan
     return Tracks(
@@ -157,17 +160,14 @@ def empty_tracks(plan: Plan, capacity: int = 64) -> Tracks:
         anchor=np.zeros((capacity, 3)),
         anchor_P=np.zeros((capacity, 3, 3)),
         life=np.zeros((capacity, 4)),
-        last_look=np.full(len(plan.sensors), -np.inf),
+        last_look=np.full(len(sensors), -np.inf),
         clutter=clutter,
         heard=np.zeros(capacity, np.int64),
         told=np.zeros((capacity, k, k + 1)),
         bank=np.zeros((k, k + 1)),
-        undetected=np.full(1, plan.settings.targets_at_start),
-        seen_range=np.zeros(len(plan.sensors)),
+        undetected=np.full(1, settings.targets_at_start),
+        seen_range=np.zeros(len(sensors)),
     )
-
-
-PER_TRACK = ("birth", "x", "P", "weight", "anchor", "anchor_P", "life", "heard", "told")
 
 
 def copy_tracks(tr: Tracks, capacity: int | None = None) -> Tracks:
@@ -176,23 +176,10 @@ def copy_tracks(tr: Tracks, capacity: int | None = None) -> Tracks:
     size = len(tr.birth) if capacity is None else capacity
     parts = {}
     for name, array in tr._asdict().items():
-        if name in PER_TRACK:
+        if name in EACH:
             fresh = np.zeros((size, *array.shape[1:]), array.dtype)
             fresh[:n] = array[:n]
             parts[name] = fresh
         else:
             parts[name] = array.copy()
     return Tracks(**parts)
-
-
-def step(tr: Tracks, plan: Plan, sensor: int, look: Look) -> tuple[Tracks, np.ndarray, np.ndarray, np.ndarray]:
-    """Take one look in order of validity; consumes `tr`. Returns tracks, and per detection: code, owner, NIS."""
-    m = len(look.dt)
-    need = int(tr.live[0]) + m
-    if need > len(tr.birth):
-        tr = copy_tracks(tr, 2 * need)
-    fate = np.zeros(m, np.int64)
-    owner = np.full(m, -1, np.int64)
-    nis = np.full(m, np.nan)
-    scan_step(tr, plan.settings, plan.sensors[sensor], look, fate, owner, nis)
-    return tr, fate, owner, nis

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from boresight.kernels.tracker import Settings, Tracks
 from boresight.tracking.core import Plan
 from boresight.tracking.output import Rows
-from boresight.tracking.window import Window
+from boresight.tracking.window import Window, copies_of
 from boresight.types import FloatArray
 
 
@@ -23,7 +23,7 @@ def smoothed_rows(window: Window, plan: Plan, after: float, until: float, t_know
 
     Rows carry `t_known`, the arrival (s) of the newest look used. A track that began after a copy has no row there.
     """
-    copies = [tracks for _, tracks in window.copies if after < float(tracks.time[0])]
+    copies = copies_of(window, after)
     if not copies or float(copies[0].time[0]) > until:
         return []
     now = window.tracks

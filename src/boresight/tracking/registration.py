@@ -78,7 +78,7 @@ class Diary:
 
     def note(self, state: TrackerState, last: bool = False) -> None:
         """Remember what the state holds, at most once a second (`last`: in any case)."""
-        t = state.clock.arrival
+        t = state.arrival
         if not self.times or t - self.times[-1] >= INTERVAL or last:
             ids = tuple(s.id for s in self.tracker.sensors)
             self.times.append(t)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
 from boresight.frames.pose import pose_track
 from boresight.kernels.tracker import NOTHING
 from boresight.tracking.config import TrackerConfig
-from boresight.tracking.output import Rows, due_before
-from boresight.tracking.tracker import REASON, Decision, Output, Tracker, TrackerState, track_ids
+from boresight.tracking.names import Names
+from boresight.tracking.output import Decisions, Rows
+from boresight.tracking.tracker import REASON, Output, Tracker, TrackerState
 from boresight.types import (
     FATES,
     NO_TRACK,
@@ -25,6 +26,7 @@ from boresight.types import (
     no_tracks,
 )
 
+MOST_LOOKS, MOST_REPORTS = 256, 10_000  # that reach the kernel in one call
 NAVIGATION_GAP = 10.0  # s without navigation data over which a pose is still interpolated
 PROBABLE = 0.5  # least probability of being a target or a thing with which a track is believed
 NAVIGATION_AHEAD = 5.0  # s beyond the ends over which it is still extrapolated
@@ -48,22 +50,24 @@ def run(
     finish: bool = True,
     progress: Callable[[Scan], None] | None = None,
     watch: Callable[[TrackerState, Output], None] | None = None,
-) -> tuple[TrackerState, list[Rows], list[Decision]]:
-    """Step a tracker through scans in order of arrival, from `state` (a fresh one); consumes it.
+) -> tuple[TrackerState, list[Rows], list[Decisions]]:
+    """Take a tracker through scans in order of arrival, from `state` (a fresh one); consumes it.
 
-    `progress` is called with every scan taken, `watch` with the state and what the step gave, also at the end.
+    `progress` is called with every scan taken, `watch` with the state and what each step gave, also at the end; with
+    `watch` scans are taken one by one, else many at a time.
     """
     state = tracker.init() if state is None else state
     rows: list[Rows] = []
-    decisions: list[Decision] = []
-    for scan in scans:
-        state, out = tracker.step(state, scan)
+    decisions: list[Decisions] = []
+    for some in _portions(scans, 1 if watch is not None else MOST_LOOKS):
+        state, out = tracker.steps(state, some)
         rows += out.rows
         decisions += out.decisions
         if watch is not None:
             watch(state, out)
         if progress is not None:
-            progress(scan)
+            for scan in some:
+                progress(scan)
     if finish:
         state, out = tracker.finish(state)
         rows += out.rows
@@ -73,16 +77,18 @@ def run(
     return state, rows, decisions
 
 
-def tick(tracker: Tracker, state: TrackerState, t_recv: float) -> Output:
-    """Give the rows due by `t_recv` (s) although no look comes in: a stage before the tracker may hold looks back."""
-    out = Output([], [], [])
-    if state.pending and t_recv > state.clock.arrival:
-        tracker._rows(state, out)
-        for t in due_before(state.clock, t_recv):
-            tracker._emit(state, out, t, t)
-    if t_recv > state.clock.arrival > -np.inf:
-        state.clock.arrival, state.pending = t_recv, True
-    return out
+def _portions(scans: Iterable[Scan], most: int) -> Iterator[list[Scan]]:
+    """Yield the scans in groups that are worth one call of the kernel and do not take much memory."""
+    some: list[Scan] = []
+    reports = 0
+    for scan in scans:
+        some.append(scan)
+        reports += len(scan.t)
+        if len(some) >= most or reports >= MOST_REPORTS:
+            yield some
+            some, reports = [], 0
+    if some:
+        yield some
 
 
 def believed(tracker: Tracker, state: TrackerState) -> tuple[float, FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -119,9 +125,7 @@ def track_rows(rows: Sequence[Rows]) -> TrackRows:
     )
 
 
-def decision_rows(
-    recording: Recording, tracker: Tracker, decisions: Sequence[Decision], names: dict[int, int]
-) -> DecisionRows:
+def decision_rows(recording: Recording, tracker: Tracker, decisions: Sequence[Decisions], names: Names) -> DecisionRows:
     """Give every row of the recording its fate, in file order, those that never reached the tracker included."""
     n = len(recording.detections)
     code = {fate: FATES.index(fate) for fate in FATES}
@@ -133,12 +137,11 @@ def decision_rows(
     reason[duplicate] = "the same row stands earlier"
     birth = np.full(n, -1, np.int64)
     nis = np.full(n, np.nan)
-    for d in decisions:
-        fate[d.row] = code[d.fate]
-        reason[d.row] = REASON.get(d.fate)
-        birth[d.row] = d.birth
-        nis[d.row] = d.nis
-    ids = track_ids(birth, names)
+    if decisions:
+        row, what, begun_by, distance = (np.concatenate(column) for column in zip(*decisions, strict=True))
+        reasons = np.array([REASON.get(f) for f in FATES], dtype=object)
+        fate[row], reason[row], birth[row], nis[row] = what, reasons[what], begun_by, distance
+    ids = names.of(birth)
     never = (birth >= 0) & (ids == NO_TRACK)
     reason[never & np.isin(fate, [code[Fate.UPDATED], code[Fate.INITIATED]])] = "the track was never confirmed"
     return DecisionRows(np.arange(n), fate, ids, nis, reason)

@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from boresight.frames.pose import PoseTrack, add_navigation_noise, sensor_pose
-from boresight.kernels.tracker import GATED, INITIATED, OUTSIDE, UNASSOCIATED, UPDATED, Look
+from boresight.kernels.tracker_looks import Looks, joined, moment
+from boresight.kernels.tracker_rows import ARRIVAL, PENDING, RowTable, row_table, rows_at_arrival
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.core import Plan, make_plan
 from boresight.tracking.lagged import smoothed_rows
-from boresight.tracking.output import Clock, Rows, due_at_arrival, due_before, note_arrival, period_of, rows_at
-from boresight.tracking.window import Entry, Window, empty_window, expire, insert
-from boresight.types import Fate, FloatArray, Scan, Sensor
+from boresight.tracking.names import Names
+from boresight.tracking.output import Decisions, Rows, decisions_of, rows_of, unseen
+from boresight.tracking.window import Left, Window, empty_window, take
+from boresight.types import NO_TRACK, Fate, FloatArray, Scan, Sensor
 
-MAX_ROW_GAP = 0.5  # s between two rows of one track id
-FATE_OF_CODE = {
-    UNASSOCIATED: Fate.UNASSOCIATED,
-    UPDATED: Fate.UPDATED,
-    INITIATED: Fate.INITIATED,
-    OUTSIDE: Fate.OUT_OF_COVERAGE,
-    GATED: Fate.GATED,
-}
 REASON = {
     Fate.UNASSOCIATED: "no track took it, and it begins none",
     Fate.GATED: "outside the gate of the nearest track, and it begins none",
@@ -36,33 +29,25 @@ REASON = {
 }
 
 
-class Decision(NamedTuple):
-    """What became of one row of the detections; `birth` names the track by the row that began it (-1: none)."""
-
-    row: int
-    fate: Fate
-    birth: int
-    nis: float
-
-
 @dataclass(slots=True, eq=False)
 class TrackerState:
     """Everything that the next step needs. `step` consumes it; `tracking.saved` copies, saves and restores it."""
 
     window: Window
-    clock: Clock
-    pending: bool = False  # looks have come at clock.arrival for which rows are still due
-    numbered: int = 0  # track ids given out
-    names: dict[int, int] = field(default_factory=dict)  # birth row -> track id, the newest
-    last_row: dict[int, float] = field(default_factory=dict)  # birth row -> time of its newest row (s)
-    smoothed: float = -np.inf  # s, time of the newest smoothed rows
+    names: Names = field(default_factory=Names)
+    smoothed: float = -np.inf  # s, up to when smoothed rows have been given
+
+    @property
+    def arrival(self) -> float:
+        """The newest time of arrival (s)."""
+        return float(self.window.clock.now[ARRIVAL])
 
 
 class Output(NamedTuple):
     """What one step gives: rows of tracks (in order), decisions that are final, and smoothed rows of the past."""
 
     rows: list[Rows]
-    decisions: list[Decision]
+    decisions: list[Decisions]
     smoothed: list[Rows]
 
 
@@ -85,6 +70,7 @@ class Tracker:
     use: tuple[int, ...] | None = None
     plan: Plan = field(init=False)
     length: float = field(init=False)  # s, of the window for late looks
+    _period: FloatArray = field(init=False)  # (S,) s, declared; NaN: to be found out; 0: not used
 
     def __post_init__(self) -> None:
         used = self.used
@@ -97,6 +83,10 @@ class Tracker:
             sweep = 0.5 * max((self.sensors[i].period or 0.0 for i in used), default=0.0)
             length = max(latencies) - min(latencies) + sweep + 1.0
         object.__setattr__(self, "length", length)
+        period = np.zeros(len(self.sensors))
+        for i in used:
+            period[i] = np.nan if self.sensors[i].period is None else self.sensors[i].period
+        object.__setattr__(self, "_period", period)
 
     @property
     def used(self) -> tuple[int, ...]:
@@ -105,7 +95,7 @@ class Tracker:
 
     def init(self) -> TrackerState:
         """Return the state before the first look."""
-        return TrackerState(empty_window(self.plan), Clock())
+        return TrackerState(empty_window(self.plan))
 
     def step(self, state: TrackerState, scan: Scan) -> tuple[TrackerState, Output]:
         """Take one look in order of arrival; consumes `state`.
@@ -113,79 +103,104 @@ class Tracker:
         Rows that the looks up to the previous arrival call for come out first: looks that arrive together are all
         taken before rows are made.
         """
-        out = Output([], [], [])
-        if state.pending and scan.t_recv > state.clock.arrival:
-            self._rows(state, out)
-            for t in due_before(state.clock, scan.t_recv):
-                self._emit(state, out, t, t)
-        out.decisions.extend(Decision(row, Fate.NO_DETECTION, -1, np.nan) for row in scan.empty_rows)
-        look = self._look(scan)
-        note_arrival(state.clock, scan.sensor, scan.t_recv)
-        state.pending = True
-        if look is None:
-            out.decisions.extend(Decision(int(row), Fate.SCREENED, -1, np.nan) for row in scan.row)
-            return state, out
-        if not insert(state.window, self.plan, scan.sensor, look, self.length):
-            out.decisions.extend(Decision(int(row), Fate.LATE, -1, np.nan) for row in scan.row)
+        return self.steps(state, (scan,))
+
+    def steps(self, state: TrackerState, scans: Sequence[Scan]) -> tuple[TrackerState, Output]:
+        """Take several looks in order of arrival at once: what `step` does one by one, and faster."""
         lag = self.config.smoothing_lag
+        if lag is not None and len(scans) > 1:  # smoothed rows depend on what was known when
+            out = Output([], [], [])
+            for scan in scans:
+                state, one = self.step(state, scan)
+                out.rows.extend(one.rows)
+                out.decisions.extend(one.decisions)
+                out.smoothed.extend(one.smoothed)
+            return state, out
+        out = self._take(state, self._looks(scans))
+        unseen_rows = [row for scan in scans for row in scan.empty_rows]
+        if unseen_rows:
+            out.decisions.insert(0, unseen(unseen_rows))
         if lag is not None:
-            self._smooth(state, out, state.clock.arrival - lag)
-        final = expire(state.window, self.length if lag is None else max(self.length, lag))
-        out.decisions.extend(decision for entry in final for decision in _decisions(entry))
+            self._smooth(state, out, state.arrival - lag)
         return state, out
+
+    def tick(self, state: TrackerState, t_recv: float) -> Output:
+        """Give the rows due by `t_recv` (s) although no look comes in: a stage before the tracker may hold looks."""
+        return self._take(state, moment(t_recv))
 
     def finish(self, state: TrackerState) -> tuple[TrackerState, Output]:
         """Give the rows that the last arrival calls for, the decisions and the smoothed rows still in the window."""
-        out = Output([], [], [])
-        if state.pending:
-            self._rows(state, out)
+        window, out = state.window, Output([], [], [])
+        if window.clock.now[PENDING]:
+            rows = row_table(16, self.dimensions)
+            rows = rows_at_arrival(
+                window.tracks, self.plan.settings, window.clock, self._period, self.config.coast_after, rows
+            )
+            self._write(state, rows, out)
         if self.config.smoothing_lag is not None:
             self._smooth(state, out, np.inf)
-        out.decisions.extend(decision for entry in state.window.entries for decision in _decisions(entry))
+        out.decisions.append(decisions_of(Left(window.looks, window.fates)))
         return state, out
 
+    def _take(self, state: TrackerState, looks: Looks) -> Output:
+        out = Output([], [], [])
+        keep_after = np.inf if self.config.smoothing_lag is None else state.smoothed
+        rows, left = take(
+            state.window, self.plan, looks, self.length, keep_after, self._period, self.config.coast_after
+        )
+        self._write(state, rows, out)
+        if len(left.looks.row):
+            out.decisions.append(decisions_of(left))
+        return out
+
+    def _write(self, state: TrackerState, rows: RowTable, out: Output) -> None:
+        n = int(rows.used[0])
+        if n:
+            out.rows.append(rows_of(rows, state.names.take(rows.birth[:n], rows.t[:n])))
+
     def _smooth(self, state: TrackerState, out: Output, until: float) -> None:
-        known = state.clock.arrival
-        for rows in smoothed_rows(state.window, self.plan, state.smoothed, until, known, self.config.coast_after):
-            state.smoothed = float(rows.t[0])
-            named = np.array([birth in state.names for birth in rows.birth.tolist()])
-            if named.any():
-                out.smoothed.append(rows.select(named, state.names))
+        for rows in smoothed_rows(
+            state.window, self.plan, state.smoothed, until, state.arrival, self.config.coast_after
+        ):
+            number = state.names.of(rows.birth)
+            shown = number != NO_TRACK
+            if shown.any():
+                parts = {name: getattr(rows, name)[shown] for name in Rows.__dataclass_fields__}
+                out.smoothed.append(Rows(**parts | {"track_id": number[shown]}))
+        state.smoothed = max(state.smoothed, until)
 
-    def _rows(self, state: TrackerState, out: Output) -> None:
-        periods = {i: period_of(state.clock, i, self.sensors[i].period) for i in self.used}
-        for t in due_at_arrival(state.clock, periods):
-            self._emit(state, out, t, state.clock.arrival)
-        state.pending = False
+    def _looks(self, scans: Sequence[Scan]) -> Looks:
+        """Take the declared latencies off and place the sensors."""
+        return joined([self._look(scan) for scan in scans])
 
-    def _emit(self, state: TrackerState, out: Output, t: float, t_known: float) -> None:
-        rows = rows_at(state.window.tracks, self.plan, t, t_known, self.config.coast_after)
-        if rows is not None:
-            out.rows.append(replace(rows, track_id=_number(state, rows.birth.tolist(), t)))
-
-    def _look(self, scan: Scan) -> Look | None:
-        """Take the declared latency off and place the sensor; None where there is no pose for it."""
+    def _look(self, scan: Scan) -> Looks:
         sensor = self.sensors[scan.sensor]
         times = np.append(scan.t, scan.t_look) - sensor.latency
         track = self.poses.get(sensor.platform) if sensor.platform is not None else None
+        t_look, R = float(times[-1]), np.ascontiguousarray(scan.covariance)
         if track is not None:
             track = track.until(scan.t_recv)
-            if not track.covers(times):
-                return None
-        position, velocity, axes = _poses(sensor, track, times)
-        R = np.ascontiguousarray(scan.covariance)
-        if track is not None:
-            R = add_navigation_noise(sensor, track, times[:-1], scan.z, R)
-        t_look = float(times[-1])
-        return Look(
-            t=t_look,
+        if track is not None and not track.covers(times):
+            t_look = np.nan
+            n = len(times)
+            position, velocity, axes = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3, 3))
+        else:
+            position, velocity, axes = _poses(sensor, track, times)
+            if track is not None:
+                R = add_navigation_noise(sensor, track, times[:-1], scan.z, R)
+        return Looks(
+            t=np.array([t_look]),
+            arrival=np.array([scan.t_recv]),
+            sensor=np.array([scan.sensor]),
+            number=np.zeros(1, np.int64),
+            first=np.array([0, len(scan.t)]),
             dt=times[:-1] - t_look,
             z=np.ascontiguousarray(scan.z),
             R=R,
             row=np.ascontiguousarray(scan.row, dtype=np.int64),
-            sensor_position=position,
-            sensor_velocity=velocity,
-            enu_from_sensor=axes,
+            position=position,
+            velocity=velocity,
+            axes=axes,
         )
 
 
@@ -196,27 +211,3 @@ def _poses(sensor: Sensor, track: PoseTrack | None, times: FloatArray) -> tuple[
         n = len(times)
         return np.repeat(position, n, axis=0), np.repeat(velocity, n, axis=0), np.repeat(axes, n, axis=0)
     return sensor_pose(sensor, track, times)
-
-
-def _number(state: TrackerState, births: list[int], t: float) -> NDArray[np.int64]:
-    """Return the ids of rows at `t`: a live track has a row every half second, one shown again begins anew."""
-    last = state.last_row.get
-    for birth in [b for b in births if t - last(b, -np.inf) > MAX_ROW_GAP]:
-        state.numbered += 1
-        state.names[birth] = state.numbered
-    state.last_row.update(dict.fromkeys(births, t))
-    return np.fromiter(map(state.names.__getitem__, births), np.int64, len(births))
-
-
-def _decisions(entry: Entry) -> list[Decision]:
-    return [
-        Decision(row, FATE_OF_CODE[code], owner, nis)
-        for row, code, owner, nis in zip(
-            entry.look.row.tolist(), entry.fate.tolist(), entry.owner.tolist(), entry.nis.tolist(), strict=True
-        )
-    ]
-
-
-def track_ids(birth: NDArray[np.int64], names: Mapping[int, int]) -> NDArray[np.int64]:
-    """Return the track ids of births, -1 where the track was never shown."""
-    return np.array([names.get(int(b), -1) for b in birth], dtype=np.int64)

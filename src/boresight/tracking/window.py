@@ -1,35 +1,19 @@
-"""Reports in the order in which they arrive, tracks as if they had come in the order of validity.
-
-Every look within the window is kept, with copies of the tracks at intervals. A look that is older than the newest one
-goes to its place: the nearest copy before it is taken up again and what follows is done anew. The result equals
-in-order processing because it is in-order processing.
-"""
+"""The window in which looks may still come late: what the kernel `tracker_window` works on, and what leaves it."""
 
 from __future__ import annotations
 
-import bisect
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from boresight.kernels.tracker import Look, Tracks
-from boresight.tracking.core import Plan, copy_tracks, empty_tracks, step
-
-Key = tuple[float, int]  # time of validity, number of arrival
-COPY_INTERVAL = 0.5  # s of validity between two copies of the tracks
-
-
-@dataclass(slots=True, eq=False)
-class Entry:
-    """One look in the window and what became of its detections (may change while it is in the window)."""
-
-    key: Key
-    sensor: int
-    look: Look
-    fate: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
-    owner: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
-    nis: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+from boresight.kernels.tracker import IntArray, Tracks
+from boresight.kernels.tracker_copies import Copies, copy_at, no_copies
+from boresight.kernels.tracker_looks import Looks, chosen, joined, no_looks
+from boresight.kernels.tracker_rows import GAPS_KEPT, Clock, RowTable
+from boresight.kernels.tracker_window import TAKEN, Fates, advance
+from boresight.tracking.core import Plan, copy_tracks
+from boresight.types import FloatArray
 
 
 @dataclass(slots=True, eq=False)
@@ -37,58 +21,80 @@ class Window:
     """The tracks now, and what is needed to go back."""
 
     tracks: Tracks
+    copies: Copies
+    looks: Looks  # in order of validity
+    fates: Fates  # of these
+    clock: Clock
     arrivals: int = 0
-    entries: list[Entry] = field(default_factory=list)
-    copies: list[tuple[Key, Tracks]] = field(default_factory=list)  # tracks before the entry with this key
+
+
+class Left(NamedTuple):
+    """Looks that have left the window, or never got in, and what became of them: final."""
+
+    looks: Looks
+    fates: Fates
 
 
 def empty_window(plan: Plan) -> Window:
     """Return a window without tracks."""
-    return Window(empty_tracks(plan))
+    tracks = copy_tracks(plan.empty)
+    n = len(plan.sensors)
+    clock = Clock(
+        np.array([-np.inf, -np.inf, 0.0]), np.full(n, -np.inf), np.zeros((n, GAPS_KEPT)), np.zeros(n, np.int64)
+    )
+    return Window(tracks, no_copies(tracks), no_looks(), _fresh(no_looks()), clock)
 
 
-def insert(window: Window, plan: Plan, sensor: int, look: Look, length: float) -> bool:
-    """Take one look into the window of `length` seconds; False, and nothing is changed, where it is older than that."""
-    entry = Entry((look.t, window.arrivals), sensor, look)
-    newest = window.entries[-1].key if window.entries else (-np.inf, -1)
-    if look.t < newest[0] - length:
-        return False
-    window.arrivals += 1
-    if entry.key > newest:
-        window.entries.append(entry)
-        _process(window, plan, len(window.entries) - 1, length)
-    else:
-        at = bisect.bisect(window.entries, entry.key, key=lambda e: e.key)
-        window.entries.insert(at, entry)
-        while window.copies and window.copies[-1][0] > entry.key:
-            window.copies.pop()
-        if window.copies:
-            key, tracks = window.copies[-1]
-            window.tracks = copy_tracks(tracks)
-        else:  # older than everything so far, and nothing has left the window yet
-            key, window.tracks = entry.key, empty_tracks(plan)
-        _process(window, plan, bisect.bisect_left(window.entries, key, key=lambda e: e.key), length)
-    return True
+def take(
+    window: Window, plan: Plan, looks: Looks, length: float, keep_after: float, period: FloatArray, coast_after: float
+) -> tuple[RowTable, Left]:
+    """Take looks in order of arrival; returns the rows due on the way, and the looks that left.
+
+    Args:
+        length: of the window (s).
+        keep_after: copies of the tracks at later times than this (s) are kept however old.
+        period: (S,) s, of each sensor: NaN where it is to be found out, 0 for one that is not used.
+        coast_after: time without a hit from which on a track coasts (s).
+    """
+    held = len(window.looks.t)
+    number = np.arange(window.arrivals, window.arrivals + len(looks.t))
+    window.arrivals += len(looks.t)
+    every = joined([window.looks, looks._replace(number=number)])
+    fates = Fates(*(np.concatenate(pair) for pair in zip(window.fates, _fresh(looks), strict=True)))
+    window.tracks, window.copies, order, rows = advance(
+        window.tracks, window.copies, plan.empty, plan.settings, plan.columns, every, fates, held, length, keep_after,
+        window.clock, period, coast_after,
+    )  # fmt: skip
+    stays = order[_needed(window.copies, every, order, length, keep_after) :]
+    rejected = held + np.flatnonzero(fates.outcome[held:] != TAKEN)
+    rejected = rejected[every.sensor[rejected] >= 0]
+    window.looks, window.fates, _ = _part(every, fates, stays)
+    looks_left, fates_left, _ = _part(every, fates, np.concatenate([rejected, order[: len(order) - len(stays)]]))
+    return rows, Left(looks_left, fates_left)
 
 
-def _process(window: Window, plan: Plan, first: int, length: float) -> None:
-    for entry in window.entries[first:]:
-        if length > 0.0 and (not window.copies or entry.key[0] - window.copies[-1][0][0] >= COPY_INTERVAL):
-            window.copies.append((entry.key, copy_tracks(window.tracks)))
-        window.tracks, entry.fate, entry.owner, entry.nis = step(window.tracks, plan, entry.sensor, entry.look)
+def copies_of(window: Window, after: float) -> list[Tracks]:
+    """Return the copies of the tracks at times later than `after` (s), in order; their arrays are views."""
+    return [copy_at(window.copies, c) for c in range(int(window.copies.used[0])) if window.copies.time[c, 0] > after]
 
 
-def expire(window: Window, length: float) -> list[Entry]:
-    """Drop what `length` seconds of window no longer need; returns the entries that left it, now final."""
-    if not window.entries:
-        return []
-    oldest = window.entries[-1].key[0] - length
-    keep = 0
-    while keep + 1 < len(window.copies) and window.copies[keep + 1][0][0] <= oldest:
-        keep += 1
-    del window.copies[:keep]
-    limit = window.copies[0][0] if window.copies else window.entries[-1].key
-    done = bisect.bisect_left(window.entries, limit, key=lambda e: e.key)
-    final = window.entries[:done]
-    del window.entries[:done]
-    return final
+def _needed(copies: Copies, looks: Looks, order: IntArray, length: float, keep_after: float) -> int:
+    """Return from which place of `order` on looks may have to be taken again."""
+    if not len(order):
+        return 0
+    n = int(copies.used[0])
+    if n == 0:
+        return len(order) - 1
+    oldest = min(looks.t[order[-1]] - length, keep_after)
+    c = max(int(np.searchsorted(copies.t[:n], oldest, side="right")) - 1, 0)
+    return int(np.flatnonzero(looks.number[order] == copies.number[c])[0])
+
+
+def _fresh(looks: Looks) -> Fates:
+    m = len(looks.dt)
+    return Fates(np.zeros(len(looks.t), np.int64), np.zeros(m, np.int64), np.full(m, -1, np.int64), np.full(m, np.nan))
+
+
+def _part(looks: Looks, fates: Fates, which: IntArray) -> tuple[Looks, Fates, IntArray]:
+    some, at = chosen(looks, which)
+    return some, Fates(fates.outcome[which], fates.code[at], fates.owner[at], fates.nis[at]), at

@@ -1,0 +1,70 @@
+"""Looks taken many at a time, and the numbers that tracks go by."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from boresight.io.scans import iter_scans
+from boresight.tracking.names import MAX_ROW_GAP, Names
+from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
+from boresight.types import DecisionRows, Recording
+from tests.tracking.test_tracker import CONFIG, same
+
+
+@pytest.mark.parametrize("lag", [None, 3.0])
+def test_many_looks_at_a_time_give_what_one_by_one_gives(harbour: Recording, lag: float | None) -> None:
+    # late looks, looks older than the window, and looks for which there is no pose
+    cut = dataclasses.replace(harbour.platforms[0], t=harbour.platforms[0].t.clip(max=40.0))
+    keep = np.concatenate([[True], np.diff(cut.t) > 0.0])
+    short = dataclasses.replace(
+        cut, **{f.name: getattr(cut, f.name)[keep] for f in dataclasses.fields(cut) if f.name != "id"}
+    )
+    recording = dataclasses.replace(harbour, platforms=(short,))
+    tracker = tracker_for(recording, dataclasses.replace(CONFIG, window=1.2, smoothing_lag=lag))
+    scans = list(iter_scans(recording))
+    many, past = tracker.init(), []
+    for first in range(0, len(scans), 37):
+        many, out = tracker.steps(many, scans[first : first + 37])
+        past += out.smoothed
+    all_at_once = run(tracker, scans)
+    smoothed = []
+
+    def watch(_: object, out: object) -> None:
+        smoothed.extend(out.smoothed)  # type: ignore[attr-defined]
+
+    one_by_one = run(tracker, scans, watch=watch)
+    same(track_rows(all_at_once[1]), track_rows(one_by_one[1]))
+    a, b = (decision_rows(recording, tracker, r[2], r[0].names) for r in (all_at_once, one_by_one))
+    for name in (f.name for f in dataclasses.fields(DecisionRows) if f.name != "extra"):
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
+    assert len({*a.fate.tolist()}) >= 5
+    n = int(many.window.tracks.live[0])
+    np.testing.assert_array_equal(many.window.tracks.x[:n], one_by_one[0].window.tracks.x[:n])
+    assert (len(smoothed) > 0) == (lag is not None)
+    until = past[-1].t[-1] if past else -np.inf
+    same(track_rows(past), track_rows([r for r in smoothed if r.t[0] <= until]))
+
+
+def test_numbers_are_those_of_a_plain_loop() -> None:
+    rng = np.random.default_rng(5)
+    names, last, number, given = Names(), {}, {}, 0  # type: ignore[var-annotated]
+    t = 0.0
+    for _ in range(200):
+        birth, times, expected = [], [], []
+        for _ in range(rng.integers(0, 4)):
+            t += rng.choice([0.1, 0.4, 0.9])
+            for b in rng.permutation(12)[: rng.integers(0, 8)].tolist():
+                if t - last.get(b, -np.inf) > MAX_ROW_GAP:
+                    given += 1
+                    number[b] = given
+                last[b] = t
+                birth.append(b)
+                times.append(t)
+                expected.append(number[b])
+        np.testing.assert_array_equal(names.take(np.array(birth, np.int64), np.array(times)), expected)
+    assert names.given == given
+    every = np.arange(-1, 13)
+    np.testing.assert_array_equal(names.of(every), [number.get(int(b), -1) for b in every])
