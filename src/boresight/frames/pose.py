@@ -12,6 +12,7 @@ from boresight.errors import UserError
 from boresight.frames.local import ENU_FROM_NED
 from boresight.kernels import pose as kernel
 from boresight.kernels import rotation, rotations
+from boresight.kernels.pose_known import known_attitudes, known_positions
 from boresight.types import Axes, Component, PlatformTrack, Pose, Sensor, Site
 from boresight.types.sensor import FloatArray
 
@@ -195,45 +196,95 @@ def sensor_pose(sensor: Sensor, track: PoseTrack | None, t: ArrayLike) -> tuple[
     n = len(times)
     if sensor.axes == Axes.SITE_ENU:
         return np.zeros((n, 3)), np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)).copy()
-    arm = np.array(sensor.mount.lever_arm, dtype=np.float64)
     if track is None:
         position, velocity, R, rate = _fixed(sensor, n)
     else:
         position, velocity = track._position(times)
-        needs_attitude = sensor.axes != Axes.PLATFORM_ENU or bool(arm.any())
-        if needs_attitude and not track.has_attitude:
-            why = f'axes = "{sensor.axes}"' if sensor.axes != Axes.PLATFORM_ENU else "a lever arm"
-            raise UserError(
-                f"sensor '{sensor.id}' has {why} and needs the attitude of platform '{track.id}', which has none"
-            )
-        if not needs_attitude:
+        if not _needs_attitude(sensor, track):
             return position, velocity, _north_aligned(track, position)
         R, rate = track._attitude(times)
+    return _mounted(sensor, track, position, velocity, R, rate)
+
+
+def sensor_poses(
+    sensor: Sensor, track: PoseTrack | None, t: FloatArray, first: NDArray[np.int64], known: FloatArray
+) -> tuple[NDArray[np.bool_], FloatArray, FloatArray, FloatArray]:
+    """Return what `sensor_pose` does for many looks, each from the navigation data that had come in when it did.
+
+    Times `t` (n,) of look i are `first[i]` to `first[i + 1]`, `known` (k,) is when it arrived (s). The first array
+    returned (k,) says whether that navigation data covers the look; where not, its poses are zero. Raises UserError as
+    `sensor_pose` does, but for times that are not covered.
+    """
+    if track is None or sensor.axes == Axes.SITE_ENU:
+        return np.ones(len(known), np.bool_), *sensor_pose(sensor, track, t)
+    limits = (track.max_gap, track.max_extrapolation)
+    good, position, velocity = known_positions(
+        track.t, track.position, track.velocity, track.measured, track.hermite, limits, SLOPE_WINDOW, t, first, known
+    )
+    needed = _needs_attitude(sensor, track)
+    if not needed and not track.has_attitude:
+        return good, position, velocity, _north_aligned(track, position)
+    turned, R, rate = known_attitudes(track.t_attitude, track.quaternion, track.steps, limits, t, first, known)
+    if not needed:  # before the first attitude stamp it does without
+        return good & (turned | (known < track.t_attitude[0])), position, velocity, _north_aligned(track, position)
+    return good & turned, *_mounted(sensor, track, position, velocity, R, rate)
+
+
+def _needs_attitude(sensor: Sensor, track: PoseTrack) -> bool:
+    """Whether the sensor's pose depends on the platform's attitude; raises UserError if so and there is none."""
+    needed = sensor.axes != Axes.PLATFORM_ENU or any(sensor.mount.lever_arm)
+    if needed and not track.has_attitude:
+        why = f'axes = "{sensor.axes}"' if sensor.axes != Axes.PLATFORM_ENU else "a lever arm"
+        raise UserError(
+            f"sensor '{sensor.id}' has {why} and needs the attitude of platform '{track.id}', which has none"
+        )
+    return needed
+
+
+def _mounted(
+    sensor: Sensor,
+    track: PoseTrack | None,
+    position: FloatArray,
+    velocity: FloatArray,
+    enu_from_body: FloatArray,
+    rate: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the sensor's pose from its platform's; position and velocity are moved in place."""
+    arm = np.array(sensor.mount.lever_arm, dtype=np.float64)
     if sensor.axes == Axes.PLATFORM_ENU and track is not None:
         axes = _north_aligned(track, position)
     else:
-        axes = kernel.sensor_axes(R, _body_from_mount(sensor))
+        axes = kernel.sensor_axes(enu_from_body, _body_from_mount(sensor))
     if arm.any():
-        kernel.add_lever_arm(position, velocity, R, rate, arm)
+        kernel.add_lever_arm(position, velocity, enu_from_body, rate, arm)
     return position, velocity, axes
 
 
 def add_navigation_noise(
-    sensor: Sensor, track: PoseTrack, t: FloatArray, z: FloatArray, covariance: FloatArray
+    sensor: Sensor,
+    track: PoseTrack,
+    t: FloatArray,
+    z: FloatArray,
+    covariance: FloatArray,
+    known: float | FloatArray = np.inf,
 ) -> FloatArray:
     """Return the covariance (n, 7, 7) of measurements `z` (n, 7) with the error of the platform's pose in it.
 
     Position error counts fully in range and Cartesian components and by the range in angles; attitude error in the
     angles, and by the distance in Cartesian components, for sensors that turn with the body. A pose beyond the last
-    stamp carries the noise of its extrapolation. Without declared errors the covariance comes back as it is.
+    stamp up to `known` (s, also for each row) carries the noise of its extrapolation. Without declared errors the
+    covariance comes back as it is.
     """
     turns = sensor.axes not in (Axes.SITE_ENU, Axes.PLATFORM_ENU)
     a = track.sigma_attitude if turns else 0.0
     p = track.sigma_position if sensor.axes != Axes.SITE_ENU else 0.0
     if not len(t) or (a == 0.0 and p == 0.0):
         return covariance
-    ahead = track.has_attitude and bool(t[-1] > track.t_attitude[-1])
-    angle2 = (a * (FORETOLD if ahead else 1.0)) ** 2
+    ahead = np.zeros(len(t), np.bool_)
+    if track.has_attitude:
+        newest = np.searchsorted(track.t_attitude, np.broadcast_to(known, t.shape), side="right") - 1
+        ahead = t > track.t_attitude[np.maximum(newest, 0)]
+    angle2 = (a * np.where(ahead, FORETOLD, 1.0)) ** 2
     far = np.where(np.isnan(z[:, Component.RANGE]), np.inf, z[:, Component.RANGE])
     across = angle2 + (p / np.maximum(far, 1.0)) ** 2
     level = np.maximum(np.cos(np.nan_to_num(z[:, Component.ELEVATION])), 1e-3)

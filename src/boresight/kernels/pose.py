@@ -191,6 +191,9 @@ def local_level(position: FloatArray, lat0: float, lon0: float, h0: float) -> Fl
     site = _ecef_from_enu_rotation(lat0, lon0)
     local = np.empty((3, 3))
     for k in range(len(position)):
+        if k > 0 and (position[k] == position[k - 1]).all():  # many detections of one look
+            out[k] = out[k - 1]
+            continue
         x, y, z = _ecef_from_enu(position[k, 0], position[k, 1], position[k, 2], lat0, lon0, h0)
         latitude, longitude, _ = _geodetic_from_ecef(x, y, z)
         _fill_rotation(math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude), local)

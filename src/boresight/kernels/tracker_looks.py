@@ -103,14 +103,19 @@ def joined(parts: list[Looks]) -> Looks:
 
 def chosen(looks: Looks, which: IntArray) -> tuple[Looks, IntArray]:
     """Return the looks `which` (k,), in that order, and the places that their detections had."""
-    count = looks.first[which + 1] - looks.first[which]
-    first = np.concatenate([[0], np.cumsum(count)])
-    at = _ranges(looks.first[which], count, first)
-    poses = _ranges(looks.first[which] + which, count + 1, first + np.arange(len(first)))
+    at, poses, first = places_of_looks(looks, which)
     per_look = {name: getattr(looks, name)[which] for name in ("t", "arrival", "sensor", "number")}
     per_detection = {name: getattr(looks, name)[at] for name in ("dt", "z", "R", "row")}
     per_pose = {name: getattr(looks, name)[poses] for name in ("position", "velocity", "axes")}
     return Looks(first=first, **per_look, **per_detection, **per_pose), at
+
+
+def places_of_looks(looks: Looks, which: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return where the detections and the poses of the looks `which` (k,) stand, and `first` (k + 1,) for these."""
+    count = looks.first[which + 1] - looks.first[which]
+    first = np.concatenate([[0], np.cumsum(count)])
+    detections = _ranges(looks.first[which], count, first)
+    return detections, _ranges(looks.first[which] + which, count + 1, first + np.arange(len(first))), first
 
 
 def _ranges(start: NDArray[np.int64], count: NDArray[np.int64], first: NDArray[np.int64]) -> NDArray[np.int64]:

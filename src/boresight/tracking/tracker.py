@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from boresight.frames.pose import PoseTrack, add_navigation_noise, sensor_pose
-from boresight.kernels.tracker_looks import Looks, joined, moment
+from boresight.frames.pose import PoseTrack, add_navigation_noise, sensor_poses
+from boresight.kernels.tracker_looks import Looks, moment, places_of_looks
 from boresight.kernels.tracker_rows import ARRIVAL, PENDING, RowTable, row_table, rows_at_arrival
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.core import Plan, make_plan
@@ -171,43 +172,44 @@ class Tracker:
 
     def _looks(self, scans: Sequence[Scan]) -> Looks:
         """Take the declared latencies off and place the sensors."""
-        return joined([self._look(scan) for scan in scans])
-
-    def _look(self, scan: Scan) -> Looks:
-        sensor = self.sensors[scan.sensor]
-        times = np.append(scan.t, scan.t_look) - sensor.latency
-        track = self.poses.get(sensor.platform) if sensor.platform is not None else None
-        t_look, R = float(times[-1]), np.ascontiguousarray(scan.covariance)
-        if track is not None:
-            track = track.until(scan.t_recv)
-        if track is not None and not track.covers(times):
-            t_look = np.nan
-            n = len(times)
-            position, velocity, axes = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3, 3))
-        else:
-            position, velocity, axes = _poses(sensor, track, times)
-            if track is not None:
-                R = add_navigation_noise(sensor, track, times[:-1], scan.z, R)
-        return Looks(
-            t=np.array([t_look]),
-            arrival=np.array([scan.t_recv]),
-            sensor=np.array([scan.sensor]),
-            number=np.zeros(1, np.int64),
-            first=np.array([0, len(scan.t)]),
-            dt=times[:-1] - t_look,
-            z=np.ascontiguousarray(scan.z),
-            R=R,
-            row=np.ascontiguousarray(scan.row, dtype=np.int64),
-            position=position,
-            velocity=velocity,
-            axes=axes,
+        count = np.array([len(scan.t) for scan in scans])
+        first = np.concatenate([[0], np.cumsum(count)])
+        sensor = np.array([scan.sensor for scan in scans])
+        latency = np.array([s.latency for s in self.sensors])[sensor]
+        t_look = np.array([scan.t_look for scan in scans]) - latency
+        t = np.concatenate([scan.t for scan in scans]) - np.repeat(latency, count)
+        looks = Looks(
+            t=t_look,
+            arrival=np.array([scan.t_recv for scan in scans]),
+            sensor=sensor,
+            number=np.zeros(len(scans), np.int64),
+            first=first,
+            dt=t - np.repeat(t_look, count),
+            z=np.concatenate([scan.z for scan in scans]),
+            R=np.concatenate([scan.covariance for scan in scans]),
+            row=np.concatenate([scan.row for scan in scans]).astype(np.int64),
+            position=np.zeros((len(t) + len(scans), 3)),
+            velocity=np.zeros((len(t) + len(scans), 3)),
+            axes=np.zeros((len(t) + len(scans), 3, 3)),
         )
+        for i in np.unique(sensor):
+            self._place(looks, np.flatnonzero(sensor == i), t)
+        return looks
 
-
-def _poses(sensor: Sensor, track: PoseTrack | None, times: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Look the pose up once where all detections share one time."""
-    if len(times) > 2 and (times == times[-1]).all():
-        position, velocity, axes = sensor_pose(sensor, track, times[-1:])
-        n = len(times)
-        return np.repeat(position, n, axis=0), np.repeat(velocity, n, axis=0), np.repeat(axes, n, axis=0)
-    return sensor_pose(sensor, track, times)
+    def _place(self, looks: Looks, which: NDArray[np.int64], t: FloatArray) -> None:
+        """Fill the poses of the looks `which` of one sensor and the noise of its navigation; `t` of all detections."""
+        sensor = self.sensors[looks.sensor[which[0]]]
+        track = self.poses.get(sensor.platform) if sensor.platform is not None else None
+        detections, poses, first = places_of_looks(looks, which)
+        times = np.empty(len(poses))
+        own = first[1:] + np.arange(len(which))  # the look itself stands behind its detections
+        is_own = np.zeros(len(poses), np.bool_)
+        is_own[own] = True
+        times[own], times[~is_own] = looks.t[which], t[detections]
+        known = looks.arrival[which]
+        good, position, velocity, axes = sensor_poses(sensor, track, times, first + np.arange(len(first)), known)
+        looks.position[poses], looks.velocity[poses], looks.axes[poses] = position, velocity, axes
+        looks.t[which[~good]] = np.nan
+        if track is not None:
+            R, until = looks.R[detections], np.repeat(known, np.diff(first))
+            looks.R[detections] = add_navigation_noise(sensor, track, t[detections], looks.z[detections], R, until)

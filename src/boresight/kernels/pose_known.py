@@ -1,0 +1,91 @@
+"""Poses as they were known at a time: from the stamps up to it alone."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from boresight.kernels.pose import first_uncovered, interpolate_attitude, interpolate_position, segment, slopes
+from boresight.types.sensor import FloatArray
+
+Flags = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+
+
+@njit(cache=True)
+def known_positions(
+    nodes: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    measured: Flags,
+    hermite: Flags,
+    limits: tuple[float, float],
+    window: float,
+    t: FloatArray,
+    first: IntArray,
+    known: FloatArray,
+) -> tuple[Flags, FloatArray, FloatArray]:
+    """Return whether each group of times is covered (k,), positions and velocities (n, 3).
+
+    Args:
+        nodes, position, velocity, measured, hermite: stamps, and what `frames.pose.PoseTrack` holds of them.
+        limits: longest gap, farthest extrapolation (s).
+        window: to either side over which a velocity that was not measured is fitted (s), from known stamps.
+        t: (n,) times (s); those of group i are `first[i]` to `first[i + 1]`, and until `known[i]` stamps are known.
+    """
+    good = np.zeros(len(known), np.bool_)
+    p, v = np.zeros((len(t), 3)), np.zeros((len(t), 3))
+    for i in range(len(known)):
+        times = t[first[i] : first[i + 1]]
+        n = np.searchsorted(nodes, known[i], side="right")
+        if n == 0 or first_uncovered(nodes[:n], times, limits[0], limits[1])[0] >= 0:
+            continue
+        good[i] = True
+        if len(times) == 0:
+            continue
+        base = max(segment(nodes[:n], times.min()) - 1, 0)
+        recent = np.searchsorted(nodes, known[i] - window)
+        fitted = velocity[base:n]
+        if n < len(nodes) and not measured[recent:n].all():
+            start = np.searchsorted(nodes, known[i] - 3.0 * window)
+            slope = slopes(nodes[start:n], position[start:n], window)
+            fitted = fitted.copy()
+            for j in range(max(recent, base), n):
+                if not measured[j]:
+                    fitted[j - base] = slope[j - start]
+        found = interpolate_position(nodes[base:n], position[base:n], fitted, hermite[base : max(n - 1, base)], times)
+        p[first[i] : first[i + 1]] = found[0]
+        v[first[i] : first[i + 1]] = found[1]
+    return good, p, v
+
+
+@njit(cache=True)
+def known_attitudes(
+    nodes: FloatArray,
+    quaternion: FloatArray,
+    steps: FloatArray,
+    limits: tuple[float, float],
+    t: FloatArray,
+    first: IntArray,
+    known: FloatArray,
+) -> tuple[Flags, FloatArray, FloatArray]:
+    """Return whether each group of times is covered (k,), rotations enu_from_body (n, 3, 3) and body rates (n, 3).
+
+    Arguments as for `known_positions`; `quaternion` and `steps` as `frames.pose.PoseTrack` holds them.
+    """
+    good = np.zeros(len(known), np.bool_)
+    R, rate = np.zeros((len(t), 3, 3)), np.zeros((len(t), 3))
+    for i in range(len(known)):
+        times = t[first[i] : first[i + 1]]
+        n = np.searchsorted(nodes, known[i], side="right")
+        if n == 0 or first_uncovered(nodes[:n], times, limits[0], limits[1])[0] >= 0:
+            continue
+        good[i] = True
+        if len(times) == 0:
+            continue
+        base = max(min(segment(nodes[:n], times.min()), n - 4), 0)
+        found = interpolate_attitude(nodes[base:n], quaternion[base:n], steps[base : max(n - 1, base)], times)
+        R[first[i] : first[i + 1]] = found[0]
+        rate[first[i] : first[i + 1]] = found[1]
+    return good, R, rate
