@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from boresight.kernels.options import LEAF
 from boresight.kernels.tracker import HIDDEN, STATIC, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
@@ -53,23 +54,13 @@ def end_and_merge(tr: Tracks, s: Settings, merging: bool, start: IntArray) -> No
         w = tr.weight[i]
         target = w[VISIBLE] + w[HIDDEN]
         crowd = start[i + 1] - start[i] if i + 1 < len(start) else 1
-        if target + w[STATIC] < s.delete_below * max(1, crowd):
-            save_lesson(tr, i, s)
-            keep[i] = False
-        elif target < s.hide_below:
-            save_lesson(tr, i, s)
+        keep[i] = target + w[STATIC] >= s.delete_below * max(1, crowd)
+        if not keep[i] or target < s.hide_below:
+            if tr.life[i, 2] > 0.0:
+                save_lesson(tr, i, s)
             tr.life[i, 2] = 0.0
-    order = np.argsort(tr.x[:n_tracks, 0])  # neighbours lie next to each other in the east
-    for a in range(n_tracks if merging else 0):
-        i = order[a]
-        for b in range(a + 1, n_tracks):
-            j = order[b]
-            if tr.x[j, 0] - tr.x[i, 0] > s.merge_distance or not keep[i]:
-                break
-            if keep[j] and are_one(tr, i, j, s):
-                weaker = j if rank(tr, i) >= rank(tr, j) else i
-                keep[weaker] = False
-                save_lesson(tr, weaker, s)
+    if merging:
+        merge(tr, s, keep)
     at = 0
     for i in range(n_tracks):
         if keep[i]:
@@ -85,6 +76,22 @@ def end_and_merge(tr: Tracks, s: Settings, merging: bool, start: IntArray) -> No
                 tr.heard[at] = tr.heard[i]
             at += 1
     tr.live[0] = at
+
+
+@njit(cache=True)
+def merge(tr: Tracks, s: Settings, keep: NDArray[np.bool_]) -> None:
+    """Take the weaker of two tracks that have become one out of `keep`."""
+    order = np.argsort(tr.x[: tr.live[0], 0])  # neighbours lie next to each other in the east
+    for a in range(len(order)):
+        i = order[a]
+        for b in range(a + 1, len(order)):
+            j = order[b]
+            if tr.x[j, 0] - tr.x[i, 0] > s.merge_distance or not keep[i]:
+                break
+            if keep[j] and are_one(tr, i, j, s):
+                weaker = j if rank(tr, i) >= rank(tr, j) else i
+                keep[weaker] = False
+                save_lesson(tr, weaker, s)
 
 
 @njit(**LEAF)
