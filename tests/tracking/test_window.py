@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from boresight.io.scans import iter_scans
+from boresight.tracking.config import TrackerConfig
 from boresight.tracking.names import MAX_ROW_GAP, Names
 from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
-from boresight.types import DecisionRows, Recording
+from boresight.tracking.tracker import Tracker
+from boresight.types import Coverage, DecisionRows, Recording, Scan, Sensor, SensorKind
 from tests.tracking.test_tracker import CONFIG, same
 
 
@@ -68,3 +70,24 @@ def test_numbers_are_those_of_a_plain_loop() -> None:
     assert names.given == given
     every = np.arange(-1, 13)
     np.testing.assert_array_equal(names.of(every), [number.get(int(b), -1) for b in every])
+
+
+def test_a_target_that_leaves_every_coverage_is_given_up() -> None:
+    sigma = np.full(7, np.nan)
+    sigma[4:6] = 5.0
+    radar = Sensor("r", SensorKind.RADAR, sigma=sigma, period=2.0, coverage=Coverage(range=(0.0, 2000.0)))
+    tracker = Tracker(TrackerConfig(survival_time=30.0), (radar,), 2)
+    state, alive = tracker.init(), []
+    R = np.full((1, 7, 7), np.nan)
+    R[0, 4:6, 4:6] = 25.0 * np.eye(2)
+    rng = np.random.default_rng(2)
+    for k in range(150):
+        t, east = 2.0 * k, 1000.0 + 10.0 * 2.0 * k  # out of the coverage after 100 s
+        z = np.full((1, 7), np.nan)
+        z[0, 4:6] = np.array([east, 0.0]) + rng.normal(0.0, 5.0, 2)
+        n = int(east < 2000.0)
+        state, _ = tracker.step(state, Scan(0, t, t, np.full(n, t), z[:n], R[:n], np.arange(k, k + n)))
+        alive.append(int(state.window.tracks.live[0]))
+    assert alive[49] == 1
+    assert alive[60] == 1  # it may come back
+    assert alive[-1] == 0

@@ -211,9 +211,7 @@ def loading() -> Iterator[None]:
 
     ready = compiled()
     if not ready:
-        print(
-            "boresight: compiling kernels, on the first run only (about half a minute) …", file=sys.stderr, flush=True
-        )
+        print("boresight: compiling kernels, on the first run only (about a minute) …", file=sys.stderr, flush=True)
     started = time.perf_counter()
     yield
     if not ready:

@@ -8,3 +8,6 @@ from typing import Any
 # arrays as an argument that costs ten times what a small function does.
 BARE: dict[str, Any] = {"cache": True, "_nrt": False}
 LEAF: dict[str, Any] = {**BARE, "forceinline": True}  # the same, put where it is called
+
+# A function that makes arrays, called by one that counts no references (what it calls would inherit that).
+COUNTED: dict[str, Any] = {"cache": True, "_nrt": True}

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from boresight.kernels.options import LEAF
 from boresight.kernels.tracker import HIDDEN, STATIC, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_begin import save_lesson
+from boresight.kernels.tracker_copies import put1, put2, put3
 
 
 @njit(cache=True)
@@ -65,17 +66,23 @@ def end_and_merge(tr: Tracks, s: Settings, merging: bool, start: IntArray) -> No
     for i in range(n_tracks):
         if keep[i]:
             if at != i:
-                tr.birth[at] = tr.birth[i]
-                tr.x[at] = tr.x[i]
-                tr.P[at] = tr.P[i]
-                tr.weight[at] = tr.weight[i]
-                tr.anchor[at] = tr.anchor[i]
-                tr.anchor_P[at] = tr.anchor_P[i]
-                tr.life[at] = tr.life[i]
-                tr.told[at] = tr.told[i]
-                tr.heard[at] = tr.heard[i]
+                move(tr, i, at)
             at += 1
     tr.live[0] = at
+
+
+@njit(**LEAF)
+def move(tr: Tracks, i: int, to: int) -> None:
+    """Put track i in the place of another."""
+    put1(tr.birth, to, tr.birth, i, 1)
+    put1(tr.heard, to, tr.heard, i, 1)
+    put2(tr.x, to, tr.x, i, 1)
+    put2(tr.weight, to, tr.weight, i, 1)
+    put2(tr.anchor, to, tr.anchor, i, 1)
+    put2(tr.life, to, tr.life, i, 1)
+    put3(tr.P, to, tr.P, i, 1)
+    put3(tr.anchor_P, to, tr.anchor_P, i, 1)
+    put3(tr.told, to, tr.told, i, 1)
 
 
 @njit(cache=True)

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from boresight.kernels.options import LEAF
 from boresight.kernels.tracker import IntArray, Look, SensorTable
 from boresight.types.sensor import FloatArray
 
@@ -34,7 +35,7 @@ class Looks(NamedTuple):
     axes: FloatArray  # (M + L, 3, 3) enu_from_sensor
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def look_at(looks: Looks, k: int) -> Look:
     """Return one look; its arrays are views."""
     a, b = looks.first[k], looks.first[k + 1]
@@ -50,7 +51,7 @@ def columns_of(tables: tuple[SensorTable, ...]) -> SensorTable:
     return SensorTable._make(np.array([table[i] for table in tables]) for i in range(len(SensorTable._fields)))
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def sensor_at(sensors: Any, i: int) -> SensorTable:
     """Return sensor i of a table made by `columns_of`."""
     return SensorTable(

@@ -9,7 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from boresight.kernels.options import BARE
 from boresight.kernels.tracker import HIDDEN, VISIBLE, IntArray, Settings, Tracks
+from boresight.kernels.tracker_copies import longer
 from boresight.types.sensor import FloatArray
 
 ROW_INTERVAL = 0.1  # s: at most one row a track in this time
@@ -42,7 +44,6 @@ class RowTable(NamedTuple):
     covariance: FloatArray  # (N, d, d)
 
 
-@njit(cache=True)
 def row_table(size: int, d: int) -> RowTable:
     """Return an empty table with room for `size` rows."""
     return RowTable(
@@ -51,7 +52,12 @@ def row_table(size: int, d: int) -> RowTable:
     )  # fmt: skip
 
 
-@njit(cache=True)
+def rows_with_room(rows: RowTable, size: int) -> RowTable:
+    """Return the rows in arrays for at least `size` of them."""
+    return rows._replace(**{name: longer(getattr(rows, name), size) for name in RowTable._fields[1:]})
+
+
+@njit(**BARE)
 def note_arrival(clock: Clock, sensor: int, t_recv: float) -> None:
     """Remember that a look of `sensor` has come."""
     if t_recv > clock.last[sensor] > -math.inf:
@@ -67,7 +73,23 @@ def note_arrival(clock: Clock, sensor: int, t_recv: float) -> None:
     clock.now[PENDING] = 1.0
 
 
-@njit(cache=True)
+@njit(**BARE)
+def median_of(values: FloatArray, n: int) -> float:
+    """Return the median of the first few values."""
+    low, high = math.nan, math.nan  # the values of the two middle ranks
+    for i in range(n):
+        below, same = 0, 0
+        for j in range(n):
+            below += 1 if values[j] < values[i] else 0
+            same += 1 if values[j] == values[i] else 0
+        if below <= (n - 1) // 2 < below + same:
+            low = values[i]
+        if below <= n // 2 < below + same:
+            high = values[i]
+    return 0.5 * (low + high)
+
+
+@njit(**BARE)
 def next_expected(clock: Clock, period: FloatArray) -> float:
     """Return when the next look may be expected (s), inf for never.
 
@@ -79,16 +101,26 @@ def next_expected(clock: Clock, period: FloatArray) -> float:
     for i in range(len(period)):
         p = period[i]
         if math.isnan(p):
-            p = np.median(clock.gaps[i, : clock.known[i]]) if clock.known[i] > 0 else 0.0
+            p = median_of(clock.gaps[i], clock.known[i]) if clock.known[i] > 0 else 0.0
         if p > 0.0 and now < clock.last[i] + p < soonest:
             soonest = clock.last[i] + p
     return soonest
 
 
-@njit(cache=True)
+@njit(**BARE)
+def times_due(clock: Clock, period: FloatArray, t_recv: float) -> int:
+    """Return at how many times rows may be due for the newest arrival and from then until `t_recv` (s): not fewer."""
+    now = clock.now[ARRIVAL]
+    until = next_expected(clock, period)
+    ahead = min((until - now) / QUIET_INTERVAL, 1.0 * MOST_AHEAD) if until < math.inf else 0.0
+    late = (t_recv - now) / QUIET_INTERVAL if t_recv < math.inf else 0.0
+    return int(ahead + max(late, 0.0)) + 4
+
+
+@njit(**BARE)
 def rows_at_arrival(
     tr: Tracks, s: Settings, clock: Clock, period: FloatArray, coast_after: float, rows: RowTable
-) -> RowTable:
+) -> None:
     """Add the rows that the newest arrival calls for: now, and ahead while no report is expected.
 
     The times ahead depend on the past alone, so that a recording that ends here gives the same rows.
@@ -96,8 +128,8 @@ def rows_at_arrival(
     clock.now[PENDING] = 0.0
     now = clock.now[ARRIVAL]
     if now - clock.now[EMITTED] < ROW_INTERVAL:
-        return rows
-    rows = add_rows(tr, s, now, now, coast_after, rows)
+        return
+    add_rows(tr, s, now, now, coast_after, rows)
     clock.now[EMITTED] = now
     until = next_expected(clock, period)
     if until < math.inf:
@@ -105,39 +137,28 @@ def rows_at_arrival(
         for _ in range(MOST_AHEAD - 1):
             if t >= until:
                 break
-            rows = add_rows(tr, s, t, now, coast_after, rows)
+            add_rows(tr, s, t, now, coast_after, rows)
             clock.now[EMITTED] = t
             t += QUIET_INTERVAL
-    return rows
 
 
-@njit(cache=True)
-def rows_before(tr: Tracks, s: Settings, clock: Clock, t_recv: float, coast_after: float, rows: RowTable) -> RowTable:
+@njit(**BARE)
+def rows_before(tr: Tracks, s: Settings, clock: Clock, t_recv: float, coast_after: float, rows: RowTable) -> None:
     """Add the rows that are missing since the last one, the next arrival having been late."""
     while clock.now[EMITTED] > -math.inf and clock.now[EMITTED] + LONGEST_GAP < t_recv:
         clock.now[EMITTED] += QUIET_INTERVAL
-        rows = add_rows(tr, s, clock.now[EMITTED], clock.now[EMITTED], coast_after, rows)
-    return rows
+        add_rows(tr, s, clock.now[EMITTED], clock.now[EMITTED], coast_after, rows)
 
 
-@njit(cache=True)
-def add_rows(tr: Tracks, s: Settings, t: float, t_known: float, coast_after: float, rows: RowTable) -> RowTable:
-    """Predict the shown tracks to time `t` (s) and add those that are still probable then."""
-    n = tr.live[0]
+@njit(**BARE)
+def add_rows(tr: Tracks, s: Settings, t: float, t_known: float, coast_after: float, rows: RowTable) -> None:
+    """Predict the shown tracks to time `t` (s) and add those that are still probable then; there must be room."""
     d = s.d
     used = rows.used[0]
-    if used + n > len(rows.t):
-        more = row_table(2 * (used + n), d)
-        more.used[0] = used
-        more.t[:used], more.t_known[:used], more.birth[:used] = rows.t[:used], rows.t_known[:used], rows.birth[:used]
-        more.coasting[:used] = rows.coasting[:used]
-        more.position[:used], more.velocity[:used] = rows.position[:used], rows.velocity[:used]
-        more.covariance[:used] = rows.covariance[:used]
-        rows = more
     dt = max(0.0, t - tr.time[0])
     survive = math.exp(-dt / s.survival_time)
     q3 = s.q * dt**3 / 3.0
-    for i in range(n):
+    for i in range(tr.live[0]):
         if not (tr.life[i, 2] > 0.0 and survive * (tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN]) >= s.hide_below):
             continue
         rows.t[used] = t
@@ -153,4 +174,3 @@ def add_rows(tr: Tracks, s: Settings, t: float, t_known: float, coast_after: flo
             rows.covariance[used, a, a] += q3
         used += 1
     rows.used[0] = used
-    return rows

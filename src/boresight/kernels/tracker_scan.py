@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from boresight.kernels.assignment import assign_sparse
-from boresight.kernels.options import LEAF
+from boresight.kernels.options import COUNTED, LEAF
 from boresight.kernels.tracker import (
     NOTHING,
     OUTSIDE,
@@ -30,7 +30,7 @@ from boresight.kernels.tracker_workroom import workroom
 from boresight.types.sensor import FloatArray
 
 
-@njit(cache=True)
+@njit(**COUNTED)
 def scan_step(
     tr: Tracks, s: Settings, sensor: SensorTable, look: Look, fate: IntArray, owner: IntArray, nis_of: FloatArray
 ) -> None:
@@ -73,6 +73,10 @@ def scan_step(
         temper = min(1.0, max(elapsed, 0.0) / sensor.decorrelation)
     tr.last_look[sensor.number] = look.t
     for i in range(n_tracks):
+        if p_d[i] <= 0.0 and look.t - tr.life[i, 1] > s.survival_time:
+            tr.weight[i] = 0.0  # out of sight, and no sensor has reported it for longer than targets last
+            tr.weight[i, NOTHING] = 1.0
+            continue
         if p_d[i] <= 0.0:
             if tr.life[i, 3] < 2.0 and tr.heard[i] == 1 << (sensor.number % 62):
                 # begun at the very edge of the coverage, where it cannot be seen again: it must not wait there for ever

@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
 from numba import njit
 
+from boresight.kernels.options import BARE
 from boresight.kernels.tracker import IntArray, SensorTable, Settings, Tracks
-from boresight.kernels.tracker_copies import Copies, drop, keep, restore, with_room
+from boresight.kernels.tracker_copies import Copies, keep, restore
 from boresight.kernels.tracker_looks import NO_SENSOR, Looks, look_at, sensor_at
 from boresight.kernels.tracker_rows import (
     ARRIVAL,
@@ -22,9 +22,9 @@ from boresight.kernels.tracker_rows import (
     Clock,
     RowTable,
     note_arrival,
-    row_table,
     rows_at_arrival,
     rows_before,
+    times_due,
 )
 from boresight.kernels.tracker_scan import scan_step
 from boresight.types.sensor import FloatArray
@@ -42,122 +42,126 @@ class Fates(NamedTuple):
     nis: FloatArray  # (M,)
 
 
-@njit(cache=True)
+class Queue(NamedTuple):
+    """The looks in the window in order of validity, and what was missing."""
+
+    order: IntArray  # (L,) places of looks
+    length: IntArray  # (1,)
+    wanted: IntArray  # (4,) room for tracks, copies, tracks in copies, and rows, where `advance` stopped for want of it
+
+
+@njit(**BARE)
 def advance(
     tr: Tracks,
     copies: Copies,
-    empty: Tracks,
+    empty: Copies,
     s: Settings,
     sensors: SensorTable,
     looks: Looks,
     fates: Fates,
-    held: int,
+    queue: Queue,
+    begin: int,
     length: float,
-    keep_after: float,
     clock: Clock,
     period: FloatArray,
     coast_after: float,
-) -> tuple[Tracks, Copies, IntArray, RowTable]:
-    """Take looks in order of arrival; consumes `tr` and `copies`.
+    rows: RowTable,
+) -> int:
+    """Take looks in order of arrival, in place; returns the place of the first for which there was no room.
 
     Args:
         tr, copies: the tracks now, and those to which one may go back.
-        empty: the tracks before the first look.
+        empty: one copy: the tracks before the first look.
         s, sensors: settings, all sensors (`columns_of`).
-        looks, fates: the first `held` lie in the window already, in order of validity; the others are new.
-        length: of the window (s); copies of a later time than `keep_after` (s) are kept however old.
+        looks, fates: those before `begin` have been taken already, `queue` holds those of them that are in the window.
+        length: of the window (s).
         clock, period, coast_after: when rows are due (`tracker_rows`).
-
-    Returns:
-        tracks, copies, the places of all looks in the window in order of validity, and the rows due on the way.
+        rows: gets the rows due on the way.
     """
-    total = len(looks.t)
-    order = np.empty(total, np.int64)
-    for k in range(held):
-        order[k] = k
-    n = held
-    rows = row_table(16, s.d)
-    for k in range(held, total):
+    order = queue.order
+    for k in range(begin, len(looks.t)):
         t_recv = looks.arrival[k]
-        if clock.now[PENDING] != 0.0 and t_recv > clock.now[ARRIVAL]:
-            rows = rows_at_arrival(tr, s, clock, period, coast_after, rows)
-            rows = rows_before(tr, s, clock, t_recv, coast_after, rows)
+        n = queue.length[0]
+        t = looks.t[k]
+        at = n
+        while at > 0 and looks.t[order[at - 1]] > t:
+            at -= 1
+        due = clock.now[PENDING] != 0.0 and t_recv > clock.now[ARRIVAL]
+        if not _has_room(tr, copies, looks, queue, k, at, times_due(clock, period, t_recv) if due else 0, rows):
+            return k
+        if due:
+            rows_at_arrival(tr, s, clock, period, coast_after, rows)
+            rows_before(tr, s, clock, t_recv, coast_after, rows)
         if looks.sensor[k] == NO_SENSOR:
             if t_recv > clock.now[ARRIVAL] > -math.inf:
                 clock.now[ARRIVAL], clock.now[PENDING] = t_recv, 1.0
             continue
         note_arrival(clock, looks.sensor[k], t_recv)
-        t = looks.t[k]
         if math.isnan(t):
             fates.outcome[k] = NO_POSE
             continue
-        newest = looks.t[order[n - 1]] if n > 0 else -math.inf
-        if t < newest - length:
+        if n > 0 and t < looks.t[order[n - 1]] - length:
             fates.outcome[k] = LATE
             continue
-        at = n
-        while at > 0 and looks.t[order[at - 1]] > t:
-            order[at] = order[at - 1]
-            at -= 1
+        for j in range(n, at, -1):
+            order[j] = order[j - 1]
         order[at] = k
-        n += 1
-        if at < n - 1:
-            tr, at = go_back(tr, copies, empty, looks, order, at)
-        for j in range(at, n):
-            k_now = order[j]
-            t_now = looks.t[k_now]
-            c = copies.used[0]
-            if length > 0.0 and (c == 0 or t_now - copies.t[c - 1] >= COPY_INTERVAL):
-                copies = keep(copies, tr, t_now, looks.number[k_now])
-            a, b = looks.first[k_now], looks.first[k_now + 1]
-            if tr.live[0] + b - a > len(tr.birth):
-                tr = with_room(tr, 2 * (tr.live[0] + b - a))
-            sensor = sensor_at(sensors, looks.sensor[k_now])
-            scan_step(tr, s, sensor, look_at(looks, k_now), fates.code[a:b], fates.owner[a:b], fates.nis[a:b])
-        forget(copies, min(looks.t[order[n - 1]] - length, keep_after))
-    return tr, copies, order[:n], rows
+        queue.length[0] = n + 1
+        if at < n:
+            at = go_back(tr, copies, empty, looks, order, at)
+        for j in range(at, n + 1):
+            next_, c = order[j], copies.used[0]
+            if length > 0.0 and (c == 0 or looks.t[next_] - copies.t[c - 1] >= COPY_INTERVAL):
+                keep(copies, tr, looks.t[next_], looks.number[next_])
+            a, b = looks.first[next_], looks.first[next_ + 1]
+            sensor = sensor_at(sensors, looks.sensor[next_])
+            scan_step(tr, s, sensor, look_at(looks, next_), fates.code[a:b], fates.owner[a:b], fates.nis[a:b])
+    return len(looks.t)
 
 
-@njit(cache=True)
-def go_back(tr: Tracks, copies: Copies, empty: Tracks, looks: Looks, order: IntArray, at: int) -> tuple[Tracks, int]:
-    """Take up the newest copy before the look at place `at` of `order`; returns tracks and the place to go on from."""
+@njit(**BARE)
+def go_back(tr: Tracks, copies: Copies, empty: Copies, looks: Looks, order: IntArray, at: int) -> int:
+    """Take up the newest copy before the look at place `at` of `order`; returns the place to go on from."""
     t = looks.t[order[at]]
     c = copies.used[0]
     while c > 0 and copies.t[c - 1] > t:
         c -= 1
     copies.used[0] = c
     if c == 0:  # older than everything so far, and nothing has left the window yet
-        fresh = with_room(empty, len(tr.birth))
-        tr = Tracks(
-            fresh.live.copy(),
-            fresh.time.copy(),
-            fresh.birth.copy(),
-            fresh.x.copy(),
-            fresh.P.copy(),
-            fresh.weight.copy(),
-            fresh.anchor.copy(),
-            fresh.anchor_P.copy(),
-            fresh.life.copy(),
-            fresh.last_look.copy(),
-            fresh.clutter.copy(),
-            fresh.heard.copy(),
-            fresh.told.copy(),
-            fresh.bank.copy(),
-            fresh.undetected.copy(),
-            fresh.seen_range.copy(),
-        )
-        return tr, 0
-    tr = restore(copies, c - 1, tr, 1)
+        restore(empty, 0, tr)
+        return 0
+    restore(copies, c - 1, tr)
     while looks.number[order[at]] != copies.number[c - 1]:
         at -= 1
-    return tr, at
+    return at
 
 
-@njit(cache=True)
-def forget(copies: Copies, oldest: float) -> None:
-    """Drop the copies before the last one that is not younger than `oldest` (s), once they are many."""
-    c = 0
-    while c + 1 < copies.used[0] and copies.t[c + 1] <= oldest:
-        c += 1
-    if c > copies.used[0] // 2:
-        drop(copies, c)
+@njit(**BARE)
+def _has_room(
+    tr: Tracks, copies: Copies, looks: Looks, queue: Queue, k: int, at: int, times: int, rows: RowTable
+) -> bool:
+    """Whether look k, `at` its place in the queue, can be taken with rows at so many times; else says what it wants.
+
+    Every detection may begin a track. Looks from the copy before it on are taken again, with copies between.
+    """
+    c = copies.used[0]
+    live = tr.live[0]
+    if at < queue.length[0]:
+        c = max(c - 1, 0)
+        while c > 0 and copies.t[c] > looks.t[k]:
+            c -= 1
+        for i in range(c, copies.used[0]):
+            live = max(live, copies.first[i + 1] - copies.first[i])
+    again = 0
+    live += looks.first[k + 1] - looks.first[k]
+    for j in range(queue.length[0] - 1, -1, -1):
+        i = queue.order[j]
+        if c == copies.used[0] or (copies.used[0] > 0 and looks.t[i] < copies.t[c]):
+            break
+        live += looks.first[i + 1] - looks.first[i]
+        again += 1
+    wanted = queue.wanted
+    wanted[0], wanted[1], wanted[3] = live, c + again + 2, rows.used[0] + times * live
+    wanted[2] = copies.first[c] + (again + 2) * live
+    enough = wanted[0] <= len(tr.birth) and wanted[1] <= len(copies.t)
+    return bool(enough and wanted[2] <= len(copies.birth) and wanted[3] <= len(rows.t))

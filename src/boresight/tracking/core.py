@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from boresight.kernels.registration import AZIMUTH, ELEVATION, N_PARAMETERS, RANGE, SCALE, TIME
 from boresight.kernels.tracker import AZIMUTH_BINS, SensorTable, Settings, Tracks
-from boresight.kernels.tracker_copies import EACH
+from boresight.kernels.tracker_copies import EACH, WHOLE, Copies, no_copies
 from boresight.kernels.tracker_looks import columns_of
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.types import N_COMPONENTS, Component, Sensor, SensorKind
@@ -33,7 +33,7 @@ class Plan(NamedTuple):
     sensors: tuple[SensorTable, ...]
     n_states: int
     columns: SensorTable  # all sensors in one table, with a leading axis
-    empty: Tracks  # before the first look
+    empty: Copies  # one: the tracks before the first look
 
 
 def make_plan(
@@ -122,7 +122,7 @@ def make_plan(
         clutter_memory=config.clutter_memory,
     )
     n = 2 * d + len(sigma)
-    return Plan(settings, tuple(tables), n, columns_of(tuple(tables)), _empty_tracks(settings, tables, n))
+    return Plan(settings, tuple(tables), n, columns_of(tuple(tables)), _before_all(settings, tables, n))
 
 
 def _constants(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[int, float]]:
@@ -143,30 +143,35 @@ def _constants(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[i
     ]
 
 
-def _empty_tracks(settings: Settings, sensors: Sequence[SensorTable], n: int, capacity: int = 64) -> Tracks:
-    """Return a table without tracks of `n` states."""
+def _before_all(settings: Settings, sensors: Sequence[SensorTable], n: int) -> Copies:
+    """Return one copy of a table without tracks of `n` states."""
     k = settings.n_constant
     clutter = np.zeros((len(sensors), AZIMUTH_BINS + 1))
     for table in sensors:
         clutter[table.number, :AZIMUTH_BINS] = table.clutter_per_scan / AZIMUTH_BINS
         clutter[table.number, AZIMUTH_BINS] = table.clutter_per_scan
-    return Tracks(
+    tracks = Tracks(
         live=np.zeros(2, np.int64),
         time=np.full(1, -np.inf),
-        birth=np.zeros(capacity, np.int64),
-        x=np.zeros((capacity, n)),
-        P=np.zeros((capacity, n, n)),
-        weight=np.zeros((capacity, 4)),
-        anchor=np.zeros((capacity, 3)),
-        anchor_P=np.zeros((capacity, 3, 3)),
-        life=np.zeros((capacity, 4)),
+        birth=np.zeros(0, np.int64),
+        x=np.zeros((0, n)),
+        P=np.zeros((0, n, n)),
+        weight=np.zeros((0, 4)),
+        anchor=np.zeros((0, 3)),
+        anchor_P=np.zeros((0, 3, 3)),
+        life=np.zeros((0, 4)),
         last_look=np.full(len(sensors), -np.inf),
         clutter=clutter,
-        heard=np.zeros(capacity, np.int64),
-        told=np.zeros((capacity, k, k + 1)),
+        heard=np.zeros(0, np.int64),
+        told=np.zeros((0, k, k + 1)),
         bank=np.zeros((k, k + 1)),
         undetected=np.full(1, settings.targets_at_start),
         seen_range=np.zeros(len(sensors)),
+    )
+    one = no_copies(tracks)
+    whole = {name: getattr(tracks, name)[None] for name in WHOLE}
+    return one._replace(
+        used=np.ones(1, np.int64), t=np.zeros(1), number=np.zeros(1, np.int64), first=np.zeros(2, np.int64), **whole
     )
 
 

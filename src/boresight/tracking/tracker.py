@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from boresight.frames.pose import PoseTrack, add_navigation_noise, sensor_poses
 from boresight.kernels.tracker_looks import Looks, moment, places_of_looks
-from boresight.kernels.tracker_rows import ARRIVAL, PENDING, RowTable, row_table, rows_at_arrival
+from boresight.kernels.tracker_rows import ARRIVAL, PENDING, RowTable, row_table, rows_at_arrival, times_due
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.core import Plan, make_plan
 from boresight.tracking.lagged import smoothed_rows
@@ -133,8 +133,9 @@ class Tracker:
         """Give the rows that the last arrival calls for, the decisions and the smoothed rows still in the window."""
         window, out = state.window, Output([], [], [])
         if window.clock.now[PENDING]:
-            rows = row_table(16, self.dimensions)
-            rows = rows_at_arrival(
+            times = times_due(window.clock, self._period, np.inf)
+            rows = row_table(times * int(window.tracks.live[0]), self.dimensions)
+            rows_at_arrival(
                 window.tracks, self.plan.settings, window.clock, self._period, self.config.coast_after, rows
             )
             self._write(state, rows, out)

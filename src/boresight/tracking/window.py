@@ -8,10 +8,17 @@ from typing import NamedTuple
 import numpy as np
 
 from boresight.kernels.tracker import IntArray, Tracks
-from boresight.kernels.tracker_copies import Copies, copy_at, no_copies
-from boresight.kernels.tracker_looks import Looks, chosen, joined, no_looks
-from boresight.kernels.tracker_rows import GAPS_KEPT, Clock, RowTable
-from boresight.kernels.tracker_window import TAKEN, Fates, advance
+from boresight.kernels.tracker_copies import (
+    Copies,
+    copies_with_room,
+    copy_at,
+    drop_oldest,
+    no_copies,
+    tracks_with_room,
+)
+from boresight.kernels.tracker_looks import NO_SENSOR, Looks, chosen, joined, no_looks
+from boresight.kernels.tracker_rows import GAPS_KEPT, Clock, RowTable, row_table, rows_with_room
+from boresight.kernels.tracker_window import TAKEN, Fates, Queue, advance
 from boresight.tracking.core import Plan, copy_tracks
 from boresight.types import FloatArray
 
@@ -37,7 +44,7 @@ class Left(NamedTuple):
 
 def empty_window(plan: Plan) -> Window:
     """Return a window without tracks."""
-    tracks = copy_tracks(plan.empty)
+    tracks = tracks_with_room(copy_tracks(copy_at(plan.empty, 0)), 64)
     n = len(plan.sensors)
     clock = Clock(
         np.array([-np.inf, -np.inf, 0.0]), np.full(n, -np.inf), np.zeros((n, GAPS_KEPT)), np.zeros(n, np.int64)
@@ -56,21 +63,29 @@ def take(
         period: (S,) s, of each sensor: NaN where it is to be found out, 0 for one that is not used.
         coast_after: time without a hit from which on a track coasts (s).
     """
-    held = len(window.looks.t)
-    number = np.arange(window.arrivals, window.arrivals + len(looks.t))
-    window.arrivals += len(looks.t)
-    every = joined([window.looks, looks._replace(number=number)])
+    held, new = len(window.looks.t), len(looks.t)
+    every = joined([window.looks, looks._replace(number=np.arange(window.arrivals, window.arrivals + new))])
+    window.arrivals += new
     fates = Fates(*(np.concatenate(pair) for pair in zip(window.fates, _fresh(looks), strict=True)))
-    window.tracks, window.copies, order, rows = advance(
-        window.tracks, window.copies, plan.empty, plan.settings, plan.columns, every, fates, held, length, keep_after,
-        window.clock, period, coast_after,
-    )  # fmt: skip
-    stays = order[_needed(window.copies, every, order, length, keep_after) :]
-    rejected = held + np.flatnonzero(fates.outcome[held:] != TAKEN)
-    rejected = rejected[every.sensor[rejected] >= 0]
-    window.looks, window.fates, _ = _part(every, fates, stays)
-    looks_left, fates_left, _ = _part(every, fates, np.concatenate([rejected, order[: len(order) - len(stays)]]))
-    return rows, Left(looks_left, fates_left)
+    queue = Queue(np.arange(held + new), np.full(1, held), np.zeros(4, np.int64))
+    rows = row_table(64 + 2 * int(window.tracks.live[0]), plan.settings.d)
+    done = held
+    while True:
+        done = advance(
+            window.tracks, window.copies, plan.empty, plan.settings, plan.columns, every, fates, queue, done, length,
+            window.clock, period, coast_after, rows,
+        )  # fmt: skip
+        if done == held + new:
+            break
+        tracks, count, copied, written = (2 * int(n) for n in queue.wanted)
+        window.tracks = tracks_with_room(window.tracks, tracks)
+        window.copies = copies_with_room(window.copies, count, copied)
+        rows = rows_with_room(rows, written)
+    order = queue.order[: int(queue.length[0])]
+    limit = _needed(window.copies, every, order, length, keep_after)
+    rejected = held + np.flatnonzero((fates.outcome[held:] != TAKEN) & (every.sensor[held:] != NO_SENSOR))
+    window.looks, window.fates = _part(every, fates, order[limit:])
+    return rows, Left(*_part(every, fates, np.concatenate([rejected, order[:limit]])))
 
 
 def copies_of(window: Window, after: float) -> list[Tracks]:
@@ -79,7 +94,7 @@ def copies_of(window: Window, after: float) -> list[Tracks]:
 
 
 def _needed(copies: Copies, looks: Looks, order: IntArray, length: float, keep_after: float) -> int:
-    """Return from which place of `order` on looks may have to be taken again."""
+    """Return from which place of `order` on looks may have to be taken again; drops the copies before, once many."""
     if not len(order):
         return 0
     n = int(copies.used[0])
@@ -87,7 +102,10 @@ def _needed(copies: Copies, looks: Looks, order: IntArray, length: float, keep_a
         return len(order) - 1
     oldest = min(looks.t[order[-1]] - length, keep_after)
     c = max(int(np.searchsorted(copies.t[:n], oldest, side="right")) - 1, 0)
-    return int(np.flatnonzero(looks.number[order] == copies.number[c])[0])
+    at = int(np.flatnonzero(looks.number[order] == copies.number[c])[0])
+    if c > n // 2:
+        drop_oldest(copies, c)
+    return at
 
 
 def _fresh(looks: Looks) -> Fates:
@@ -95,6 +113,6 @@ def _fresh(looks: Looks) -> Fates:
     return Fates(np.zeros(len(looks.t), np.int64), np.zeros(m, np.int64), np.full(m, -1, np.int64), np.full(m, np.nan))
 
 
-def _part(looks: Looks, fates: Fates, which: IntArray) -> tuple[Looks, Fates, IntArray]:
+def _part(looks: Looks, fates: Fates, which: IntArray) -> tuple[Looks, Fates]:
     some, at = chosen(looks, which)
-    return some, Fates(fates.outcome[which], fates.code[at], fates.owner[at], fates.nis[at]), at
+    return some, Fates(fates.outcome[which], fates.code[at], fates.owner[at], fates.nis[at])
