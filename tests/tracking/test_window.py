@@ -12,7 +12,7 @@ from boresight.tracking.config import TrackerConfig
 from boresight.tracking.names import MAX_ROW_GAP, Names
 from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
 from boresight.tracking.tracker import Tracker
-from boresight.types import Coverage, DecisionRows, Recording, Scan, Sensor, SensorKind
+from boresight.types import FATES, Coverage, DecisionRows, Fate, Recording, Scan, Sensor, SensorKind
 from tests.tracking.test_tracker import CONFIG, same
 
 
@@ -91,3 +91,15 @@ def test_a_target_that_leaves_every_coverage_is_given_up() -> None:
     assert alive[49] == 1
     assert alive[60] == 1  # it may come back
     assert alive[-1] == 0
+
+
+def test_positions_beyond_the_coverage_are_counted_and_begin_nothing() -> None:
+    sigma = np.full(7, np.nan)
+    sigma[4:6] = 5.0
+    radar = Sensor("r", SensorKind.RADAR, sigma=sigma, coverage=Coverage(range=(0.0, 2000.0)))
+    tracker = Tracker(TrackerConfig(), (radar,), 2)
+    z, R = np.full((2, 7), np.nan), np.full((2, 7, 7), np.nan)
+    z[:, 4:6], R[:, 4:6, 4:6] = [[500.0, 0.0], [1500.0, 1500.0]], 25.0 * np.eye(2)
+    state, _ = tracker.step(tracker.init(), Scan(0, 0.0, 0.0, np.zeros(2), z, R, np.arange(2)))
+    _, out = tracker.finish(state)
+    assert [FATES[c] for d in out.decisions for c in d.fate.tolist()] == [Fate.INITIATED, Fate.OUT_OF_COVERAGE]

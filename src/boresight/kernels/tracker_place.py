@@ -130,6 +130,17 @@ def component_covariance(look: Look, k: int, s: Settings, sensor: SensorTable, m
             R[a, a] = spread * spread
 
 
+@njit(**LEAF)
+def covered(z: FloatArray, sensor: SensorTable) -> bool:
+    """Whether a detection lies within the declared coverage, with some margin for its noise."""
+    range_m, azimuth = z[0], z[1]
+    if math.isfinite(z[4]) and math.isfinite(z[5]):
+        up = z[6] if math.isfinite(z[6]) else 0.0
+        range_m = math.sqrt(z[4] * z[4] + z[5] * z[5] + up * up)
+        azimuth = math.atan2(z[4], z[5]) if sensor.azimuth_span < 2.0 * math.pi else math.nan
+    return within(range_m, azimuth, z[2], sensor, 1.0)
+
+
 @njit(cache=True)
 def places_of(look: Look, s: Settings, sensor: SensorTable, usable: NDArray[np.bool_]) -> Places:
     """Return where all usable detections of a look lie."""

@@ -23,7 +23,7 @@ from boresight.kernels.tracker import (
 from boresight.kernels.tracker_begin import begin
 from boresight.kernels.tracker_end import end_and_merge, show
 from boresight.kernels.tracker_gate import gate_all, learn_clutter
-from boresight.kernels.tracker_place import places_of, within
+from boresight.kernels.tracker_place import covered, places_of, within
 from boresight.kernels.tracker_state import predict_all
 from boresight.kernels.tracker_weigh import evidence, merged, take, weigh
 from boresight.kernels.tracker_workroom import workroom
@@ -47,7 +47,7 @@ def scan_step(
         fate[k] = UNASSOCIATED
         owner[k] = -1
         nis_of[k] = np.nan
-        usable[k] = within(look.z[k, 0], look.z[k, 1], look.z[k, 2], sensor, 1.0)
+        usable[k] = covered(look.z[k], sensor)
         if not usable[k]:
             fate[k] = OUTSIDE
     at = places_of(look, s, sensor, usable)
