@@ -77,7 +77,7 @@ def packed_stream(reports: Rows) -> Callable[[], np.ndarray]:
     return call
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def own_move(x, dt, p, x_out, F, Q):
     """A user's nearly constant velocity: p = (q,)."""
     F[:, :] = 0.0
@@ -90,7 +90,7 @@ def own_move(x, dt, p, x_out, F, Q):
         x_out[i], x_out[3 + i] = x[i] + dt * x[3 + i], x[3 + i]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def own_see(x, z, c, y, H, R):
     """A user's range, azimuth and elevation at the origin: c = variances; range may be missing."""
     flat2 = x[0] * x[0] + x[1] * x[1]

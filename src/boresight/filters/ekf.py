@@ -10,7 +10,7 @@ from numpy import empty
 from boresight.errors import UserError
 from boresight.kernels.gaussian import joseph_update, sandwich
 from boresight.kernels.motion import move
-from boresight.kernels.space import MISFIT, predict_space, update_space
+from boresight.kernels.space import predict_space, update_space
 from boresight.kernels.step import predict_step, update_step
 from boresight.models import check
 from boresight.models.base import KernelSensor
@@ -20,7 +20,7 @@ from boresight.models.protocols import MeasurementModel, MotionModel
 from boresight.types.sensor import FloatArray
 from boresight.types.state import GaussianState, UpdateInfo
 
-MOVED = (7, 6)
+SQUARE = (6, 6)
 new = tuple.__new__  # of a named tuple, without the detour through its own
 NOTHING = "the measurement has no component that can be used: nothing measured, or zero range"
 
@@ -45,12 +45,9 @@ def predict(state: GaussianState, motion: MotionModel, t: float) -> GaussianStat
     if not 0.0 <= dt < math.inf:
         raise UserError(f"cannot predict from t = {state.t!r} to t = {t!r}: time must not run backwards")
     if type(motion) is NearlyConstantVelocity and motion.dimensions == 3:
-        out = empty(MOVED)
-        try:
-            if predict_space(state.x, state.P, dt, motion.q, out):
-                return new(GaussianState, (float(t), out[6], out[:6]))
-        except TypeError:  # not contiguous float64: the way for all
-            pass
+        x, P = empty(6), empty(SQUARE)
+        if predict_space(state.x, state.P, dt, motion.q, x, P):  # False: other arrays, the way for all
+            return new(GaussianState, (float(t), x, P))
     if isinstance(motion, KernelMotion) and motion.kernel is move and len(state.x) == motion.state_dimension:
         return GaussianState(float(t), *predict_step(state.x, state.P, dt, motion.parameters))
     if isinstance(motion, KernelMotion):
@@ -76,15 +73,12 @@ def update(
     """
     if n_estimated is None and isinstance(sensor, KernelSensor) and sensor.separable:  # the straight-line kernel
         m = len(sensor.components)
-        out = empty((8 + m, 6))  # P, the mean, y, S: one array is quicker made, and handed over, than four
-        try:
-            used, nis, log_likelihood = update_space(state.x, state.P, z, sensor.context, out)
-        except TypeError:  # not contiguous float64: the way for all
-            used = MISFIT
+        x, P, y, S = empty(6), empty(SQUARE), empty(m), empty((m, m))
+        used, nis, log_likelihood = update_space(state.x, state.P, z, sensor.context, x, P, y, S)
         if used > 0 and nis == nis:
-            m = int(used)
-            info = new(UpdateInfo, (out[7, :m], out[8 : 8 + m, :m], nis, log_likelihood))
-            return new(GaussianState, (state.t, out[6], out[:6])), info
+            if used < m:
+                y, S = y[:used], S[:used, :used]
+            return new(GaussianState, (state.t, x, P)), new(UpdateInfo, (y, S, nis, log_likelihood))
     n = len(state.x) if n_estimated is None else n_estimated
     if isinstance(sensor, KernelSensor):
         x, P, y, S, nis, log_likelihood = update_step(state.x, state.P, sensor.columns(z), sensor.context, n)

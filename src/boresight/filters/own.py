@@ -12,11 +12,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from boresight.errors import UserError
-from boresight.filters.packed import Table
+from boresight.filters.packed import NOT_PACKED, Table
 from boresight.kernels import config
 from boresight.kernels.address import address_of
-from boresight.kernels.own import CONTEXT, COVARIANCE, MEAN, MEASURED, PARAMETERS, TIME, N, own_stream
-from boresight.kernels.own import own_step as step
+from boresight.kernels.own import (
+    CONTEXT,
+    COVARIANCE,
+    MEAN,
+    MEASURED,
+    MISFIT,
+    PARAMETERS,
+    TIME,
+    N,
+    own_step,
+    own_stream,
+)
 from boresight.kernels.signatures import MOTION, OBSERVATION
 from boresight.models.base import KernelSensor
 from boresight.models.motion.base import KernelMotion
@@ -81,6 +91,18 @@ def table(t: Sequence[float] | FloatArray, sensors: Sequence[Any], z: Sequence[F
     which = np.array([rows[id(s)] for s in sensors], dtype=np.int64)
     columns = np.array([s.columns(row) for s, row in zip(sensors, z)])
     return Table(np.array(t, dtype=float), columns, np.array([s.context for s in different.values()]), which)
+
+
+def step(belief: FloatArray, report: FloatArray, motion: int, observe: int) -> float:
+    """Move a packed belief to the time of a report and condition it on it, in place; returns as `packed.step`.
+
+    `motion` and `observe` are the addresses that `models` gives. Raises UserError for arrays that are not as `pack` and
+    `report` make them.
+    """
+    nis: float = own_step(belief, report, motion, observe)
+    if nis == MISFIT:
+        raise UserError(NOT_PACKED)
+    return nis
 
 
 def run(

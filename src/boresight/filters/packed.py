@@ -18,8 +18,17 @@ from numpy.typing import NDArray
 
 from boresight.errors import UserError
 from boresight.kernels import tiles
-from boresight.kernels.packed import BELIEF_SIZE, CONTEXT, MEASURED, NUMBERS, POWER, REPORT_SIZE, TIME
-from boresight.kernels.packed import packed_step as step
+from boresight.kernels.packed import (
+    BELIEF_SIZE,
+    CONTEXT,
+    MEASURED,
+    MISFIT,
+    NUMBERS,
+    POWER,
+    REPORT_SIZE,
+    TIME,
+    packed_step,
+)
 from boresight.kernels.packed import packed_stream as _stream
 from boresight.models.base import KernelSensor
 from boresight.models.motion import NearlyConstantVelocity
@@ -31,6 +40,10 @@ __all__ = ["BatchResult", "Table", "fits", "pack", "report", "run", "run_many", 
 _HALF = np.triu_indices(3)  # ee, en, eu, nn, nu, uu
 NONE_KEPT, NO_NIS = np.empty((0, 27)), np.empty(0)
 NO_TILES = np.empty((0, 0, 0))
+NOT_PACKED = (
+    "step takes a belief and a report as pack and report make them: contiguous, writeable arrays of float64, of their "
+    "length"
+)
 
 
 class Table(NamedTuple):
@@ -140,6 +153,18 @@ def schedule(sensors: Sequence[KernelSensor]) -> tuple[FloatArray, NDArray[np.in
     if not all(isinstance(s, KernelSensor) and s.separable for s in different):
         _require(None, ())
     return np.array([s.context for s in different]), np.array([rows[id(s)] for s in sensors], dtype=np.int64)
+
+
+def step(belief: FloatArray, report: FloatArray) -> float:
+    """Move a packed belief (29,) to the time of a report (74,) and condition it on it, in place; returns the NIS.
+
+    NaN where an innovation variance was not positive; BACKWARDS (-1), with nothing changed, where the report is before
+    the belief or its time is not a number. Raises UserError for arrays that are not as `pack` and `report` make them.
+    """
+    nis: float = packed_step(belief, report)
+    if nis == MISFIT:
+        raise UserError(NOT_PACKED)
+    return nis
 
 
 def run(belief: FloatArray, reports: Table, kept: FloatArray = NONE_KEPT, nis: FloatArray = NO_NIS) -> None:

@@ -7,6 +7,7 @@ measurement's columns (7, NaN where not measured), then the sensor's context. Th
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit, types
@@ -16,6 +17,7 @@ from boresight.kernels.arctan import FAST, INLINE
 from boresight.kernels.gaussian import joseph_update
 from boresight.kernels.observation import IntArray
 from boresight.kernels.signatures import MATRIX, VECTOR
+from boresight.kernels.unwrap import THING, direct, vector
 from boresight.types.sensor import FloatArray
 
 SixNumbers = tuple[float, float, float, float, float, float]
@@ -23,8 +25,9 @@ SixNumbers = tuple[float, float, float, float, float, float]
 N = 6
 TIME, MEAN, COVARIANCE, PARAMETERS = 0, 1, 7, 43
 MEASURED, CONTEXT = 1, 8
-BACKWARDS = -1.0  # what `own_step` returns where the report is before the belief
+BACKWARDS, MISFIT = -1.0, -2.0  # what `own_step` returns: report before the belief; arrays of another size or type
 WORK = 212
+ZEROS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 Room = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
 
 
@@ -40,37 +43,58 @@ def dot(a: SixNumbers, b: SixNumbers) -> float:
     return (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) + (a[3] * b[3] + a[4] * b[4] + a[5] * b[5])
 
 
+@njit(**INLINE)
+def add(a: SixNumbers, f: float, b: SixNumbers) -> SixNumbers:
+    """Return a + f b."""
+    return a[0] + f * b[0], a[1] + f * b[1], a[2] + f * b[2], a[3] + f * b[3], a[4] + f * b[4], a[5] + f * b[5]
+
+
+@njit(**INLINE)
+def combine(f: SixNumbers, A: FloatArray, start: SixNumbers) -> SixNumbers:
+    """Return start + f A: rows of `A` (6, 6) that do not count are left out, and most of F and H are zero."""
+    total = start
+    for j in range(N):
+        if f[j] != 0.0:
+            total = add(total, f[j], row(A, j))
+    return total
+
+
 @njit(**FAST)
 def advance(F: FloatArray, P: FloatArray, Q: FloatArray, T: FloatArray) -> None:
-    """Overwrite `P` (6, 6) with F P Fᵀ + Q, exactly symmetric; `T` (6, 6) is scratch."""
-    for j in range(N):
-        p = row(P, j)  # = column j
-        for i in range(N):
-            T[i, j] = dot(row(F, i), p)
+    """Overwrite `P` (6, 6) with F P Fᵀ + Q, exactly symmetric; `T` (6, 6) is scratch, for (F P)ᵀ."""
     for i in range(N):
-        t = row(T, i)
-        for j in range(i + 1):
-            P[i, j] = P[j, i] = dot(t, row(F, j)) + 0.5 * (Q[i, j] + Q[j, i])
+        column = combine(row(F, i), P, ZEROS)
+        for k in range(N):
+            T[k, i] = column[k]
+    for i in range(N):
+        moved = combine(row(F, i), T, row(Q, i))
+        for k in range(N):
+            P[i, k] = moved[k]
+    for i in range(N):
+        for j in range(i):
+            P[i, j] = P[j, i] = 0.5 * (P[i, j] + P[j, i])
 
 
-@njit(**FAST)
+@njit(**INLINE)
 def condition(x: FloatArray, P: FloatArray, h: SixNumbers, y: float, r: float) -> float:
-    """Condition on one number with innovation `y`, slope `h`, noise variance `r`; returns y²/s, NaN if s ≤ 0."""
-    g = (
-        dot(row(P, 0), h), dot(row(P, 1), h), dot(row(P, 2), h),
-        dot(row(P, 3), h), dot(row(P, 4), h), dot(row(P, 5), h),
-    )  # fmt: skip
+    """Condition on one number with innovation `y`, slope `h`, noise variance `r`; returns y²/s, NaN if s ≤ 0.
+
+    With k = P h/√s: x⁺ = x + k y/√s, P⁺ = P - k kᵀ, whole rows and yet exactly symmetric.
+    """
+    g = combine(h, P, ZEROS)
     s = dot(h, g) + r
     if not s > 0.0:
         return math.nan
-    w = 1.0 / s
+    w = math.sqrt(1.0 / s)
     e = w * y
+    k = add(ZEROS, w, g)
+    mean = add((x[0], x[1], x[2], x[3], x[4], x[5]), e, k)
     for i in range(N):
-        x[i] += g[i] * e
-        k = w * g[i]
-        for j in range(i + 1):
-            P[i, j] = P[j, i] = P[i, j] - k * g[j]
-    return float(e * y)
+        x[i] = mean[i]
+        left = add(row(P, i), -k[i], k)
+        for j in range(N):
+            P[i, j] = left[j]
+    return float(e * e)
 
 
 @njit(**FAST)
@@ -110,9 +134,12 @@ def room() -> Room:
     )
 
 
-@njit(types.float64(VECTOR, VECTOR, types.int64, types.int64), **FAST)
-def own_step(belief: FloatArray, report: FloatArray, motion: int, observe: int) -> float:
+@njit(types.float64(THING, THING, types.int64, types.int64), **FAST)
+def _own_step(belief: Any, report: Any, motion: int, observe: int) -> float:
     """Move a belief to the report's time and condition it on it, in place; returns as `packed.packed_step`."""
+    belief, report = vector(belief), vector(report)
+    if belief.shape[0] < PARAMETERS or report.shape[0] < CONTEXT:
+        return MISFIT
     dt = report[TIME] - belief[TIME]
     if not dt >= 0.0:
         return BACKWARDS
@@ -125,6 +152,9 @@ def own_step(belief: FloatArray, report: FloatArray, motion: int, observe: int) 
     nis = take(x, P, see(x, report[MEASURED:CONTEXT], report[CONTEXT:], y, H, R), y, H, R)
     belief[TIME] = report[TIME]
     return float(nis)
+
+
+own_step = direct(_own_step)
 
 
 @njit(

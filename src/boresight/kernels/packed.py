@@ -10,6 +10,7 @@ because unwrapping the arguments is most of what a call from Python costs.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from numba import njit, types
 
@@ -28,6 +29,7 @@ from boresight.kernels.observation import (
 from boresight.kernels.sight import polar, range_rate, turned_polar
 from boresight.kernels.signatures import MATRIX, STACK, VECTOR
 from boresight.kernels.space import load_dense, store_dense
+from boresight.kernels.unwrap import THING, direct, vector
 from boresight.types.sensor import FloatArray
 
 Conditioned = tuple[Three, Three, Six, Nine, Six, float, int]
@@ -38,6 +40,7 @@ MEASURED, CONTEXT = 1, 8  # of a report
 REPORT_SIZE = CONTEXT + CONTEXT_SIZE
 UNFIT = -1  # what `space_stream` returns for a sensor that it cannot take
 BACKWARDS = -1.0  # what `packed_step` returns where the report is before the belief: NIS cannot be negative
+MISFIT = -2.0  # and where an array has another size or type
 
 
 @njit(**INLINE)
@@ -84,13 +87,17 @@ def look(p: Three, v: Three, A: Six, B: Nine, C: Six, z: FloatArray, k: int, c: 
     return p, v, A, B, C, total, used
 
 
-@njit(types.float64(VECTOR, VECTOR), **FAST)
-def packed_step(belief: FloatArray, report: FloatArray) -> float:
+@njit(types.float64(THING, THING), **FAST)
+def _packed_step(belief: Any, report: Any) -> float:
     """Move a packed belief (29,) to the report's time at nearly constant velocity and condition it on it, in place.
 
     Returns the normalised innovation squared; NaN where an innovation variance was not positive, and BACKWARDS, with
-    nothing changed, where the report is before the belief or its time is not a number.
+    nothing changed, where the report is before the belief or its time is not a number; MISFIT, likewise, where an array
+    has another size or type.
     """
+    belief, report = vector(belief), vector(report)
+    if belief.shape[0] != BELIEF_SIZE or report.shape[0] != REPORT_SIZE:
+        return MISFIT
     dt = report[TIME] - belief[TIME]
     if not dt >= 0.0:
         return BACKWARDS
@@ -100,6 +107,9 @@ def packed_step(belief: FloatArray, report: FloatArray) -> float:
     store(belief, NUMBERS, 1, p, v, A, B, C)
     belief[TIME] = report[TIME]
     return float(nis)
+
+
+packed_step = direct(_packed_step)
 
 
 @njit(

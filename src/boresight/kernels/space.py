@@ -1,22 +1,23 @@
 """The friendly filter's two steps for position and velocity in space: dense arrays in and out, the algebra of `blocks`.
 
-What a call from Python costs is mostly arguments and arrays: the caller makes the results and nothing is allocated here
-but one scratch of slopes.
+What a call from Python costs is mostly arguments and arrays: the caller makes the results, nothing is allocated here
+but one scratch of slopes, and the arguments are Python's own (`kernels.unwrap`).
 """
 
 # Numba caches by file and compiles kernels.blocks and kernels.sight into these: clear __pycache__ when those change.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit, types
 
 from boresight.kernels.arctan import FAST, INLINE, near
 from boresight.kernels.blocks import Belief, Nine, Six, Three, condition_rate, dot, move, spread
-from boresight.kernels.observation import NOISE, POSITION, ROTATION, VELOCITY
+from boresight.kernels.observation import CONTEXT_SIZE, NOISE, POSITION, ROTATION, VELOCITY
 from boresight.kernels.sight import polar, range_rate, turned_polar
-from boresight.kernels.signatures import MATRIX, VECTOR
+from boresight.kernels.unwrap import THING, direct, matrix, vector
 from boresight.types.sensor import FloatArray
 
 MISFIT = -1  # what `update_space` returns where z, x or P have another size
@@ -48,17 +49,18 @@ def store_dense(x: FloatArray, P: FloatArray, p: Three, v: Three, A: Six, B: Nin
             P[i, 3 + j] = P[3 + j, i] = B[3 * i + j]
 
 
-@njit(types.boolean(VECTOR, MATRIX, types.float64, types.float64, MATRIX), **FAST)
-def predict_space(x: FloatArray, P: FloatArray, dt: float, q: float, out: FloatArray) -> bool:
-    """Move by `dt` (s) at nearly constant velocity, q in m²/s³: `out` (7, 6) is filled with P (6, 6), then the mean.
+@njit(types.boolean(THING, THING, types.float64, types.float64, THING, THING), **FAST)
+def _predict_space(x: Any, P: Any, dt: float, q: float, moved: Any, spread: Any) -> bool:
+    """Move by `dt` (s) at nearly constant velocity, q in m²/s³: `moved` (6,) and `spread` (6, 6) are filled.
 
-    Returns False, with nothing done, where x or P have another size.
+    Returns False, with nothing done, where an array has another size or type.
     """
-    if x.shape[0] != 6 or P.shape[0] != 6 or P.shape[1] != 6:
+    x, P, moved, spread = vector(x), matrix(P), vector(moved), matrix(spread)
+    if not (x.shape[0] == 6 and P.shape == (6, 6) and moved.shape[0] == 6 and spread.shape == (6, 6)):
         return False
     p, v, A, B, C = load_dense(x, P)
     p, v, A, B, C = move(p, v, A, B, C, dt, q)
-    store_dense(out[6], out, p, v, A, B, C)
+    store_dense(moved, spread, p, v, A, B, C)
     return True
 
 
@@ -99,34 +101,38 @@ def slopes(p: Three, v: Three, z: FloatArray, c: FloatArray, H: FloatArray) -> i
     return m
 
 
-THREE_NUMBERS = types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
+USED = types.Tuple((types.int64, types.float64, types.float64))  # type: ignore[no-untyped-call]
 
 
-@njit(THREE_NUMBERS(VECTOR, MATRIX, VECTOR, VECTOR, MATRIX), **FAST)
-def update_space(
-    x: FloatArray, P: FloatArray, z: FloatArray, context: FloatArray, out: FloatArray
-) -> tuple[float, float, float]:
-    """Condition on `z` (m,), the components with noise in `context`, in order.
+@njit(USED(THING, THING, THING, THING, THING, THING, THING, THING), **FAST)
+def _update_space(
+    x: Any, P: Any, z: Any, context: Any, mean: Any, covariance: Any, y: Any, S: Any
+) -> tuple[int, float, float]:
+    """Condition on `z` (m,), the components with noise in `context`, in order; m ≤ 6.
 
-    `out` (8 + m, 6), m ≤ 6, is filled with the covariance (6, 6), the mean, y (m,) and S (m, m); caller and context
-    must agree on m. Returns how many components were used (the first so many of y and S are filled; MISFIT where sizes
-    do not fit), the normalised innovation squared (NaN where S is not positive definite) and log N(y; 0, S).
+    `mean` (6,), `covariance` (6, 6), `y` (m,) and `S` (m, m) are filled; caller and context must agree on m. Returns
+    how many components were used (the first so many of y and S are filled; MISFIT where an array has another size or
+    type), the normalised innovation squared (NaN where S is not positive definite) and log N(y; 0, S).
     """
+    x, P, z, context = vector(x), matrix(P), vector(z), vector(context)
+    mean, covariance, y, S = vector(mean), matrix(covariance), vector(y), matrix(S)
     size = z.shape[0]
-    if out.shape[0] != 8 + size or size > 6 or x.shape[0] != 6 or P.shape[0] != 6 or P.shape[1] != 6:
+    if not (x.shape[0] == 6 and P.shape == (6, 6) and mean.shape[0] == 6 and covariance.shape == (6, 6)):
         return MISFIT, 0.0, 0.0
-    H = np.empty((size, 8))
+    if not (context.shape[0] == CONTEXT_SIZE and 0 < size <= 6 and y.shape[0] == size and S.shape == (size, size)):
+        return MISFIT, 0.0, 0.0
+    H = np.empty((6, 8))
     p, v, A, B, C = load_dense(x, P)
     m = slopes(p, v, z, context, H)
     for i in range(m):
-        out[7, i] = H[i, 7]
+        y[i] = H[i, 7]
         h, g = (H[i, 0], H[i, 1], H[i, 2]), (H[i, 3], H[i, 4], H[i, 5])
         a, b = spread(A, B, C, h, g)
         for j in range(i + 1):
-            out[8 + i, j] = out[8 + j, i] = (
+            S[i, j] = S[j, i] = (
                 H[j, 0] * a[0] + H[j, 1] * a[1] + H[j, 2] * a[2] + H[j, 3] * b[0] + H[j, 4] * b[1] + H[j, 5] * b[2]
             )
-        out[8 + i, i] += H[i, 6]
+        S[i, i] += H[i, 6]
     nis, det = 0.0, 1.0
     here, speed = p, v
     for i in range(m):
@@ -134,5 +140,8 @@ def update_space(
         p, v, A, B, C, part, s = condition_rate(p, v, A, B, C, here, speed, h, g, H[i, 7], H[i, 6])
         nis += part
         det *= s
-    store_dense(out[6], out, p, v, A, B, C)
+    store_dense(mean, covariance, p, v, A, B, C)
     return m, nis, -0.5 * (nis + math.log(det) + m * math.log(2.0 * math.pi))
+
+
+predict_space, update_space = direct(_predict_space), direct(_update_space)
