@@ -138,7 +138,7 @@ def covered(z: FloatArray, sensor: SensorTable) -> bool:
         up = z[6] if math.isfinite(z[6]) else 0.0
         range_m = math.sqrt(z[4] * z[4] + z[5] * z[5] + up * up)
         azimuth = math.atan2(z[4], z[5]) if sensor.azimuth_span < 2.0 * math.pi else math.nan
-    return within(range_m, azimuth, z[2], sensor, 1.0)
+    return bool(within(range_m, azimuth, z[2], sensor, 1.0))
 
 
 @njit(cache=True)

@@ -68,7 +68,7 @@ def take(
     window.arrivals += new
     fates = Fates(*(np.concatenate(pair) for pair in zip(window.fates, _fresh(looks), strict=True)))
     queue = Queue(np.arange(held + new), np.full(1, held), np.zeros(4, np.int64))
-    rows = row_table(64 + 2 * int(window.tracks.live[0]), plan.settings.d)
+    rows = row_table(64 + 8 * int(window.tracks.live[0]), plan.settings.d)
     done = held
     while True:
         done = advance(
@@ -84,8 +84,12 @@ def take(
     order = queue.order[: int(queue.length[0])]
     limit = _needed(window.copies, every, order, length, keep_after)
     rejected = held + np.flatnonzero((fates.outcome[held:] != TAKEN) & (every.sensor[held:] != NO_SENSOR))
+    gone = np.concatenate([rejected, order[:limit]])
+    if not len(gone) and (order == np.arange(held + new)).all():  # all stay, in this order
+        window.looks, window.fates = every, fates
+        return rows, Left(*_NOTHING)
     window.looks, window.fates = _part(every, fates, order[limit:])
-    return rows, Left(*_part(every, fates, np.concatenate([rejected, order[:limit]])))
+    return rows, Left(*(_part(every, fates, gone) if len(gone) else _NOTHING))
 
 
 def copies_of(window: Window, after: float) -> list[Tracks]:
@@ -116,3 +120,6 @@ def _fresh(looks: Looks) -> Fates:
 def _part(looks: Looks, fates: Fates, which: IntArray) -> tuple[Looks, Fates]:
     some, at = chosen(looks, which)
     return some, Fates(fates.outcome[which], fates.code[at], fates.owner[at], fates.nis[at])
+
+
+_NOTHING = no_looks(), _fresh(no_looks())
