@@ -1,7 +1,7 @@
-"""A large scenario through the whole tracker: `python -m benchmarks.whole_tracker [TRACKS] [SECONDS]`.
+"""A large scenario through the whole tracker: `python -m benchmarks.whole_tracker [TRACKS] [SECONDS] [PERIOD]`.
 
-Five radars on one site each look all round every 10 s, one after another, 1 % clutter: 4,000 targets give 2,000 reports
-a second (the published capacity of ARTAS, EUROCONTROL's tracker). Prints how many times faster than real time it goes.
+Five radars on one site each look all round every PERIOD (10 s), one after another, 1 % clutter: 4,000 targets give
+2,000 reports a second (the published capacity of ARTAS, EUROCONTROL's tracker). Prints how many times faster than real time it goes.
 """
 
 from __future__ import annotations
@@ -88,4 +88,5 @@ def measure(targets: int, seconds: float, period: float = 10.0) -> dict[str, flo
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 4000
-    print(measure(count, float(sys.argv[2]) if len(sys.argv) > 2 else 120.0))
+    seconds, period = (float(sys.argv[i]) if len(sys.argv) > i else v for i, v in ((2, 120.0), (3, 10.0)))
+    print(measure(count, seconds, period))
