@@ -1,7 +1,8 @@
 """A large scenario through the whole tracker: `python -m benchmarks.whole_tracker [TRACKS] [SECONDS] [PERIOD]`.
 
 Five radars on one site each look all round every PERIOD (10 s), one after another, 1 % clutter: 4,000 targets give
-2,000 reports a second (the published capacity of ARTAS, EUROCONTROL's tracker). Prints how many times faster than real time it goes.
+2,000 reports a second (the published capacity of ARTAS, EUROCONTROL's tracker). Prints how many times
+faster than real time it goes.
 """
 
 from __future__ import annotations

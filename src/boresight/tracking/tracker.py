@@ -108,6 +108,8 @@ class Tracker:
 
     def steps(self, state: TrackerState, scans: Sequence[Scan]) -> tuple[TrackerState, Output]:
         """Take several looks in order of arrival at once: what `step` does one by one, and faster."""
+        if not scans:
+            return state, Output([], [], [])
         lag = self.config.smoothing_lag
         if lag is not None and len(scans) > 1:  # smoothed rows depend on what was known when
             out = Output([], [], [])
