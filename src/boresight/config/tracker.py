@@ -32,6 +32,8 @@ TRACKER_KEYS = {
     "hide_below": ("hide_below", 1.0),
     "delete_below": ("delete_below", 1.0),
     "merge_distance_m": ("merge_distance", 1.0),
+    "association": ("association", 1.0),
+    "blob_share": ("blob_share", 1.0),
     "lonely_bearings": ("lonely_bearings", 1.0),
     "clutter_memory_looks": ("clutter_memory", 1.0),
     "coast_after_s": ("coast_after", 1.0),
@@ -54,6 +56,7 @@ SENSOR_KEYS = {
     "resolution_m": ("resolution", 1.0),
     "report_range_m": ("report_range", 1.0),
     "moves_tracks": ("moves_tracks", 1.0),
+    "association": ("association", 1.0),
 }
 
 
@@ -77,6 +80,8 @@ class TrackerTable(TableModel, frozen=True):
     hide_below: float | None = None
     delete_below: float | None = None
     merge_distance_m: float | None = None
+    association: str | None = None
+    blob_share: float | None = None
     lonely_bearings: bool | None = None
     clutter_memory_looks: float | None = None
     coast_after_s: float | None = None
@@ -103,6 +108,7 @@ class ErrorsTable(TableModel, frozen=True):
     resolution_m: float | None = None
     report_range_m: float | None = None
     moves_tracks: bool | None = None
+    association: str | None = None
 
 
 class ConfigTable(TableModel, frozen=True):
@@ -153,7 +159,7 @@ def _values(table: TableModel, keys: dict[str, tuple[str, float]], where: str) -
         value = getattr(table, key)
         if value is None:
             continue
-        if not isinstance(value, bool):
+        if not isinstance(value, bool | str):
             if not value >= 0.0:
                 raise UserError(f"{where}: {key}: {value} is negative")
             value = value * factor
@@ -168,7 +174,7 @@ def parameters_of(config: TrackerConfig) -> dict[str, Any]:
         out = {}
         for key, (name, factor) in keys.items():
             value = getattr(item, name)
-            out[key] = value if value is None or isinstance(value, bool) else value / factor
+            out[key] = value if value is None or isinstance(value, bool | str) else value / factor
         return out
 
     assert {f.name for f in dataclasses.fields(SensorErrors)} == {name for name, _ in SENSOR_KEYS.values()}

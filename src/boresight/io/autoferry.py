@@ -89,6 +89,7 @@ confirm_above = 0.95
 hide_below = 0.4
 merge_distance_m = 15.0
 apart_m = 22.0
+blob_share = 0.1
 clutter_memory_looks = 15.0
 
 [[sensor]]

@@ -38,6 +38,7 @@ class Tracks(NamedTuple):
     last_look: FloatArray  # (n_sensors,) s
     clutter: FloatArray  # (n_sensors, AZIMUTH_BINS + 1) mean false detections of a look, per azimuth bin and in all
     heard: IntArray  # (cap,) bit i set: sensor i has moved the track
+    beside: IntArray  # (cap,) birth of the track beside which bearings began this one; its anchor is relative to that
     told: FloatArray  # (cap, k, k + 1) what a track was told of the k constant sensor errors: information, vector
     bank: FloatArray  # (k, k + 1) what ended tracks had learned of them
     undetected: FloatArray  # (1,) expected number of targets that no track follows yet
@@ -78,6 +79,7 @@ class SensorTable(NamedTuple):
     resolution: float  # m: nearer targets may give one detection together
     report_range: float  # m: targets farther from the sensor are tracked but not shown on its word
     moves_tracks: bool  # False: its detections are evidence that a track exists, but do not move it
+    joint: bool  # tracks share its detections (JPDA) instead of taking one each
 
 
 class Settings(NamedTuple):
@@ -107,3 +109,5 @@ class Settings(NamedTuple):
     apart: float  # m: a track nearer than this to a shown one is not shown beside it
     lonely_bearings: bool  # bearings update only where nobody else could claim them
     clutter_memory: float  # looks
+    blob: float  # m, the largest resolution of the ranging sensors in use
+    blob_share: float  # probability that a second bearing beside a shown track is a second target in its blob

@@ -13,7 +13,7 @@ from boresight.kernels.tracker import IntArray, Tracks
 from boresight.types.sensor import FloatArray
 
 WHOLE = ("live", "time", "last_look", "clutter", "bank", "undetected", "seen_range")
-EACH = ("birth", "x", "P", "weight", "anchor", "anchor_P", "life", "heard", "told")
+EACH = ("birth", "x", "P", "weight", "anchor", "anchor_P", "life", "heard", "beside", "told")
 
 
 class Copies(NamedTuple):
@@ -40,6 +40,7 @@ class Copies(NamedTuple):
     anchor_P: FloatArray  # (N, 3, 3)
     life: FloatArray  # (N, 4)
     heard: IntArray  # (N,)
+    beside: IntArray  # (N,)
     told: FloatArray  # (N, k, k + 1)
 
 
@@ -92,6 +93,7 @@ def keep(copies: Copies, tr: Tracks, t: float, number: int) -> None:
     put3(copies.anchor_P, a, tr.anchor_P, 0, n)
     put2(copies.life, a, tr.life, 0, n)
     put1(copies.heard, a, tr.heard, 0, n)
+    put1(copies.beside, a, tr.beside, 0, n)
     put3(copies.told, a, tr.told, 0, n)
 
 
@@ -115,6 +117,7 @@ def restore(copies: Copies, c: int, tr: Tracks) -> None:
     put3(tr.anchor_P, 0, copies.anchor_P, a, n)
     put2(tr.life, 0, copies.life, a, n)
     put1(tr.heard, 0, copies.heard, a, n)
+    put1(tr.beside, 0, copies.beside, a, n)
     put3(tr.told, 0, copies.told, a, n)
 
 

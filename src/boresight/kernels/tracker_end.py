@@ -25,7 +25,7 @@ def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look) -> None:
             if sensor.report_range == s.farthest_report and gap > (1.1 * sensor.report_range) ** 2:
                 save_lesson(tr, i, s)
                 tr.life[i, 2] = 0.0
-        elif target > s.show_above and gap < sensor.report_range**2 and stands_apart(tr, i, s):
+        elif target > s.show_above and gap < sensor.report_range**2 and (tr.heard[i] == 0 or stands_apart(tr, i, s)):
             tr.life[i, 2] = 1.0
 
 
@@ -76,6 +76,7 @@ def move(tr: Tracks, i: int, to: int) -> None:
     """Put track i in the place of another."""
     put1(tr.birth, to, tr.birth, i, 1)
     put1(tr.heard, to, tr.heard, i, 1)
+    put1(tr.beside, to, tr.beside, i, 1)
     put2(tr.x, to, tr.x, i, 1)
     put2(tr.weight, to, tr.weight, i, 1)
     put2(tr.anchor, to, tr.anchor, i, 1)
@@ -105,6 +106,8 @@ def merge(tr: Tracks, s: Settings, keep: NDArray[np.bool_]) -> None:
 def are_one(tr: Tracks, i: int, j: int, s: Settings) -> bool:
     """Whether two tracks, each hit more than once, are at one place and move alike."""
     if tr.life[i, 3] < 2.0 or tr.life[j, 3] < 2.0:
+        return False
+    if tr.heard[i] == 0 or tr.heard[j] == 0:  # begun because bearings tell it from its neighbour
         return False
     gap = 0.0
     speed = 0.0

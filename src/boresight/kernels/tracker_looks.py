@@ -73,6 +73,7 @@ def sensor_at(sensors: Any, i: int) -> SensorTable:
         sensors.resolution[i],
         sensors.report_range[i],
         sensors.moves_tracks[i],
+        sensors.joint[i],
     )
 
 

@@ -23,7 +23,9 @@ from boresight.kernels.tracker import (
 from boresight.kernels.tracker_begin import begin
 from boresight.kernels.tracker_end import end_and_merge, show
 from boresight.kernels.tracker_gate import gate_all, learn_clutter
+from boresight.kernels.tracker_joint import shares, take_shares
 from boresight.kernels.tracker_place import covered, places_of, within
+from boresight.kernels.tracker_split import begin_beside, follow_blob, keep_beside, unplaced
 from boresight.kernels.tracker_state import predict_all
 from boresight.kernels.tracker_weigh import evidence, merged, take, weigh
 from boresight.kernels.tracker_workroom import workroom
@@ -72,6 +74,8 @@ def scan_step(
     if sensor.decorrelation > 0.0:
         temper = min(1.0, max(elapsed, 0.0) / sensor.decorrelation)
     tr.last_look[sensor.number] = look.t
+    joint = sensor.joint or (s.blob_share > 0.0 and not sensor.ranging and unplaced(tr))
+    share = shares(tr, s, start, column, loglik, p_d, m) if joint else loglik
     for i in range(n_tracks):
         if p_d[i] <= 0.0 and look.t - tr.life[i, 1] > s.survival_time:
             tr.weight[i] = 0.0  # out of sight, and no sensor has reported it for longer than targets last
@@ -84,7 +88,7 @@ def scan_step(
                 weigh(tr, i, log_miss, log_miss, temper)
             continue
         k = col_of_row[i]
-        shy = s.lonely_bearings and not sensor.ranging
+        shy = s.lonely_bearings and not sensor.ranging and not sensor.joint and tr.heard[i] > 0
         if shy and start[i + 1] > start[i] and (start[i + 1] - start[i] > 1 or claims[column[start[i]]] > 1):
             if k >= 0:  # ambiguous: neither evidence nor update
                 row_of_col[k] = -1
@@ -97,13 +101,24 @@ def scan_step(
             fate[k] = UPDATED
             owner[k] = tr.birth[i]
             nis_of[k] = distance[e]
+        blob = merged(tr, i, s, sensor, col_of_row) if k < 0 else -1
+        if blob >= 0:
+            if at.there[blob]:
+                follow_blob(tr, i, s, sensor, look, at.fix[blob], blob)
+        elif sensor.joint or (tr.heard[i] == 0 and not sensor.ranging):
+            take_shares(tr, i, s, sensor, look, at, room, start, column, share, k, p_d[i], temper)
+        elif k >= 0:
             take(tr, i, s, sensor, look, k, at, room, evidence(i, start, column, loglik, row_of_col, p_d[i]), temper)
-        elif not merged(tr, i, s, sensor, start, column, row_of_col):
+        else:
             log_any = evidence(i, start, column, loglik, row_of_col, p_d[i])
             weigh(tr, i, log_any, log_any, temper)
+    if s.blob_share > 0.0:
+        keep_beside(tr, s, sensor, look, col_of_row, usable)
     learn_clutter(tr, s, sensor, look, claims, row_of_col, usable)
     if sensor.ranging:
         begin(tr, s, sensor, look, fate, owner, row_of_col, usable, at)
+    elif s.blob_share > 0.0:
+        begin_beside(tr, s, sensor, look, fate, owner, usable)
     if sensor.ranging:
         show(tr, s, sensor, look)
     end_and_merge(tr, s, sensor.ranging, start)

@@ -29,20 +29,22 @@ def evidence(i: int, start: IntArray, column: IntArray, loglik: FloatArray, row_
 
 
 @njit(**LEAF)
-def merged(
-    tr: Tracks, i: int, s: Settings, sensor: SensorTable, start: IntArray, column: IntArray, row_of_col: IntArray
-) -> bool:
-    """Whether the detection that track `i` would have had may be one with that of a near shown track."""
-    for e in range(start[i], start[i + 1]):
-        j = row_of_col[column[e]]
-        if j < 0 or j == i or tr.life[j, 2] == 0.0:
+def merged(tr: Tracks, i: int, s: Settings, sensor: SensorTable, col_of_row: IntArray) -> int:
+    """Return the detection of a near shown track that may be one with what track `i` would have had, -1 for none.
+
+    Near is nearer than what the sensor resolves, as far as the two places are known.
+    """
+    if sensor.resolution <= 0.0:
+        return -1
+    for j in range(len(col_of_row)):
+        if col_of_row[j] < 0 or j == i or tr.life[j, 2] == 0.0:
             continue
         gap = 0.0
         for a in range(s.d):
-            gap += (tr.x[i, a] - tr.x[j, a]) ** 2
+            gap += (tr.x[i, a] - tr.x[j, a]) ** 2 - (tr.P[i, a, a] + tr.P[j, a, a])
         if gap < sensor.resolution**2:
-            return True
-    return False
+            return int(col_of_row[j])
+    return -1
 
 
 @njit(**LEAF)

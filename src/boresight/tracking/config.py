@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from boresight.errors import UserError
+from boresight.errors import UserError, did_you_mean
+
+ASSOCIATIONS = ("nearest", "jpda")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +31,7 @@ class SensorErrors:
     fade_range: float = float("inf")  # m: where the detection probability has fallen to half
     resolution: float = 0.0  # m: targets nearer to each other may give one detection together (ranging sensors)
     moves_tracks: bool = True  # False: its detections are evidence that a track exists, but do not move it
+    association: str | None = None  # "nearest" or "jpda" for this sensor's detections (None: as the tracker's)
     report_range: float = float("inf")  # m: farther targets are tracked but not shown (ranging sensors)
 
 
@@ -43,6 +46,7 @@ class TrackerConfig:
     q: float | None = None  # m²/s³, white-acceleration power spectral density (2-D: 0.1, 3-D: 1)
     speed_sigma: float | None = None  # m/s, prior velocity of a new track per axis (2-D: 8, 3-D: 150)
     gate_probability: float = 0.999
+    association: str = "nearest"  # or "jpda": tracks share the detections in their gates instead of taking one each
     birth_rate: float = 0.01  # new targets a look
     survival_time: float = 120.0  # s
     hide_time: float = 120.0  # s, mean time for which a target stays visible
@@ -58,6 +62,7 @@ class TrackerConfig:
     delete_below: float = 1e-4
     merge_distance: float | None = None  # m (2-D: 10, 3-D: 30)
     lonely_bearings: bool = True
+    blob_share: float = 0.0  # probability that a second bearing beside a shown track is a target in the same blob
     clutter_memory: float = 30.0  # looks
     coast_after: float = 4.0  # s without a hit after which a shown track counts as coasting
     smoothing_lag: float | None = None  # s: also give the tracks of so long ago, smoothed with all that came since
@@ -74,3 +79,13 @@ class TrackerConfig:
             raise UserError("tracker: gate_probability must lie in [0.5, 1)")
         if not 0.0 <= self.hide_below <= self.confirm_above <= 1.0:
             raise UserError("tracker: need 0 <= hide_below <= confirm_above <= 1")
+        _check_association(self.association, "tracker")
+        for sensor, errors in self.sensors.items():
+            if errors.association is not None:
+                _check_association(errors.association, f"sensor['{sensor}']")
+
+
+def _check_association(word: str, where: str) -> None:
+    if word not in ASSOCIATIONS:
+        known = "', '".join(ASSOCIATIONS)
+        raise UserError(f"{where}: association is '{known}', not '{word}'{did_you_mean(word, ASSOCIATIONS)}")

@@ -85,6 +85,7 @@ def make_plan(
                 resolution=errors.resolution,
                 report_range=errors.report_range,
                 moves_tracks=errors.moves_tracks,
+                joint=(errors.association or config.association) == "jpda",
             )
         )
     sigma += [value for value, _ in known]
@@ -120,6 +121,8 @@ def make_plan(
         apart=config.apart,
         lonely_bearings=config.lonely_bearings,
         clutter_memory=config.clutter_memory,
+        blob=max([t.resolution for t in tables if t.ranging and (used is None or t.number in used)] or [0.0]),
+        blob_share=config.blob_share,
     )
     n = 2 * d + len(sigma)
     return Plan(settings, tuple(tables), n, columns_of(tuple(tables)), _before_all(settings, tables, n))
@@ -163,6 +166,7 @@ def _before_all(settings: Settings, sensors: Sequence[SensorTable], n: int) -> C
         last_look=np.full(len(sensors), -np.inf),
         clutter=clutter,
         heard=np.zeros(0, np.int64),
+        beside=np.zeros(0, np.int64),
         told=np.zeros((0, k, k + 1)),
         bank=np.zeros((k, k + 1)),
         undetected=np.full(1, settings.targets_at_start),

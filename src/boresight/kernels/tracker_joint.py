@@ -1,0 +1,162 @@
+"""Joint association inside the tracker: every track takes its share of every detection in its gate (JIPDA).
+
+With r the probability that a track is there to be detected, a pair weighs r p_D N/λ and a miss 1 - r p_D; the marginals
+of all joint events (`kernels.jpda`) say how likely each detection is a track's own (Musicki and Evans 2004).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from boresight.kernels.jpda import marginals
+from boresight.kernels.registration import TIME
+from boresight.kernels.tracker import HIDDEN, NOTHING, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
+from boresight.kernels.tracker_place import Places
+from boresight.kernels.tracker_state import apply_update, components, innovation, linearise
+from boresight.kernels.tracker_weigh import allow_stop, moving_likelihood, static_likelihood, weigh
+from boresight.kernels.tracker_workroom import Workroom
+from boresight.types.sensor import FloatArray
+
+MOST_STATES = 300_000.0  # of a cluster of tracks that is worked out exactly
+LEAST_SHARE = 1e-6
+
+
+@njit(cache=True)
+def shares(
+    tr: Tracks, s: Settings, start: IntArray, column: IntArray, loglik: FloatArray, p_d: FloatArray, m: int
+) -> FloatArray:
+    """Return (pairs,) each pair's likelihood ratio p_D N/λ, lowered by what other tracks claim of the detection.
+
+    For a track alone it is p_D N/λ itself; in general p_j / p_miss · (1 - r p_D) / r, so that 1 - p_D plus the sum over
+    a track's pairs is the evidence of this look for it (the JIPDA existence update).
+    """
+    n = len(start) - 1
+    weight = np.empty(len(column))
+    miss = np.ones(n)
+    there = np.empty(n)
+    for i in range(n):
+        there[i] = max(min(1.0 - tr.weight[i, NOTHING] - tr.weight[i, HIDDEN], 1.0 - 1e-9), s.doubt)
+        miss[i] = 1.0 - there[i] * p_d[i]
+        for e in range(start[i], start[i + 1]):
+            weight[e] = there[i] * p_d[i] * math.exp(min(loglik[e], 100.0))
+    p = np.zeros(len(column))
+    p_miss = np.ones(n)
+    marginals(start, column, weight, miss, m, MOST_STATES, p, p_miss, np.zeros(n, np.int64))
+    for i in range(n):
+        for e in range(start[i], start[i + 1]):
+            p[e] *= miss[i] / (max(p_miss[i], 1e-12) * there[i])
+    return p
+
+
+@njit(cache=True)
+def take_shares(
+    tr: Tracks,
+    i: int,
+    s: Settings,
+    sensor: SensorTable,
+    look: Look,
+    at: Places,
+    room: Workroom,
+    start: IntArray,
+    column: IntArray,
+    share: FloatArray,
+    own: int,
+    p_d: float,
+    temper: float,
+) -> None:
+    """Condition track `i` on its shares of a look: hypotheses, and state as the mixture of what could have happened.
+
+    `own` is the detection that is most likely its own (-1: none): it counts as a hit and conditions the anchor.
+    """
+    visible = 1.0 - p_d
+    still = 1.0 - p_d
+    for e in range(start[i], start[i + 1]):
+        visible += share[e]
+        still += share[e] * still_ratio(tr, i, s, sensor, look, column[e], at, room, column[e] == own)
+    moves = sensor.moves_tracks and (sensor.ranging or tr.heard[i] > 0)
+    if moves:
+        mix(tr, i, s, sensor, look, room, start, column, share, visible)
+    weigh(tr, i, math.log(visible), math.log(still), temper)
+    if own >= 0:
+        if sensor.ranging:
+            allow_stop(tr, i, s)
+        if moves:
+            tr.heard[i] |= 1 << (sensor.number % 62)
+        tr.life[i, 1] = look.t + look.dt[own]
+        tr.life[i, 3] += 1.0
+
+
+@njit(cache=True)
+def still_ratio(
+    tr: Tracks,
+    i: int,
+    s: Settings,
+    sensor: SensorTable,
+    look: Look,
+    k: int,
+    at: Places,
+    room: Workroom,
+    update: bool,
+) -> float:
+    """Likelihood of detection `k` if track `i` does not move, over that if it does; 1 for sensors without range.
+
+    With `update` the anchor is conditioned on it.
+    """
+    if not at.there[k]:
+        return 1.0
+    anchor, anchor_P = tr.anchor[i].copy(), tr.anchor_P[i].copy()
+    moving = moving_likelihood(tr, i, s, sensor, look, k, at, room)
+    ratio = math.exp(min(static_likelihood(tr, i, s, room.fix, at.covariance[k], room) - moving, 100.0))
+    if not update:
+        tr.anchor[i] = anchor
+        tr.anchor_P[i] = anchor_P
+    return ratio
+
+
+@njit(cache=True)
+def mix(
+    tr: Tracks,
+    i: int,
+    s: Settings,
+    sensor: SensorTable,
+    look: Look,
+    room: Workroom,
+    start: IntArray,
+    column: IntArray,
+    share: FloatArray,
+    visible: float,
+) -> None:
+    """Replace a track's state by mean and covariance over what its target may have caused: a detection, or none."""
+    n = tr.x.shape[1]
+    w = tr.weight[i]
+    total = w[VISIBLE] * visible + w[HIDDEN]
+    alone = tr.heard[i] | 1 << (sensor.number % 62) == 1 << (sensor.number % 62)
+    learns = n - s.n_constant if alone else n
+    prior = tr.x[i].copy()
+    prior_P = tr.P[i].copy()
+    mean = np.zeros(n)
+    square = np.zeros((n, n))  # second moments about the prior mean: no cancellation of large coordinates
+    left = 1.0
+    for e in range(start[i], start[i + 1]):
+        beta = w[VISIBLE] * share[e] / max(total, 1e-300)
+        if beta < LEAST_SHARE:
+            continue
+        k = column[e]
+        x, P = prior.copy(), prior_P.copy()
+        c = components(look.z[k], s.d, room.mask)
+        linearise(x, s.d, k, look.dt[k], look, sensor, c, room)
+        innovation(P, look.z[k], look.R[k], c, room, s.d, sensor.constant[TIME])
+        apply_update(x, P, c, room, learns)
+        step = x - prior
+        mean += beta * step
+        square += beta * (P + np.outer(step, step))
+        left -= beta
+    square += max(left, 0.0) * prior_P - np.outer(mean, mean)
+    for a in range(n):
+        tr.x[i, a] = prior[a] + mean[a]
+        for b in range(a + 1):
+            tr.P[i, a, b] = 0.5 * (square[a, b] + square[b, a])
+            tr.P[i, b, a] = tr.P[i, a, b]

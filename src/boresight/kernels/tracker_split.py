@@ -1,0 +1,259 @@
+"""Two targets in one detection: a second bearing begins a track beside a shown one, and a blob places what is in it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from boresight.kernels.measurement import measure, wrap
+from boresight.kernels.tracker import (
+    INITIATED,
+    NOTHING,
+    UPDATED,
+    VISIBLE,
+    IntArray,
+    Look,
+    SensorTable,
+    Settings,
+    Tracks,
+)
+from boresight.kernels.tracker_begin import pooled_constants, tell
+from boresight.kernels.tracker_place import within
+from boresight.types.sensor import FloatArray
+
+BELIEVED = 0.2  # least probability to be something with which a track accounts for a second bearing
+OFFSET_LEAST = 5.0  # m: bearings of one target err by as much together, however many there are
+VELOCITY_SHARE = 0.25  # of the prior speed: how two targets in one blob may differ
+
+
+@njit(cache=True)
+def unplaced(tr: Tracks) -> bool:
+    """Whether there is a track that only bearings have told of."""
+    return bool((tr.heard[: tr.live[0]] == 0).any())
+
+
+@njit(cache=True)
+def begin_beside(
+    tr: Tracks, s: Settings, sensor: SensorTable, look: Look, fate: IntArray, owner: IntArray, usable: NDArray[np.bool_]
+) -> None:
+    """Begin a track where two bearings stand within the angular extent that a shown track's blob may have.
+
+    The nearer one is the shown track's; the other's place is as far from it as the two bearings are apart, at the
+    blob's range with half its size as spread. Nothing begins where another track nearby accounts for the bearing.
+    """
+    last = len(look.dt)
+    z = np.empty(7)
+    h6 = np.empty((7, 6))
+    work = np.zeros((2, 3))
+    for host in range(tr.live[0]):
+        if tr.life[host, 2] == 0.0 or tr.heard[host] == 0 or accompanied(tr, host, s):
+            continue
+        work[0, : s.d] = tr.x[host, : s.d]
+        measure(work[0], work[1], look.sensor_position[last], look.sensor_velocity[last],
+                look.enu_from_sensor[last], z, h6)  # fmt: skip
+        if not within(z[0], z[1], z[2], sensor, 0.0):
+            continue
+        extent = math.atan2(s.blob, z[0])
+        own = nearest_bearing(look, usable, z[1], extent)
+        if own < 0:
+            continue
+        for k in range(last):
+            gap = wrap(look.z[k, 1] - look.z[own, 1])
+            noise = math.sqrt(look.R[k, 1, 1] + look.R[own, 1, 1])
+            least = max(4.0 * noise, s.merge_distance / z[0])
+            free = usable[k] and fate[k] != INITIATED and fate[k] != UPDATED
+            if free and least < abs(gap) <= extent + 2.0 * noise:
+                place_beside(tr, host, s, sensor, look, k, z, gap, noise)
+                fate[k] = INITIATED
+                owner[k] = look.row[k]
+                break
+
+
+@njit(cache=True)
+def accompanied(tr: Tracks, host: int, s: Settings) -> bool:
+    """Whether a track that may be something stands where a second target in the blob of `host` could be."""
+    for j in range(tr.live[0]):
+        if j == host or (tr.heard[j] > 0 and 1.0 - tr.weight[j, NOTHING] < BELIEVED):
+            continue
+        gap = 0.0
+        for a in range(s.d):
+            gap += (tr.x[j, a] - tr.x[host, a]) ** 2
+        if gap < 4.0 * s.blob**2:
+            return True
+    return False
+
+
+@njit(cache=True)
+def nearest_bearing(look: Look, usable: NDArray[np.bool_], azimuth: float, reach: float) -> int:
+    """Return the detection whose azimuth is nearest to `azimuth`, -1 where none is within `reach` (rad)."""
+    best = -1
+    for k in range(len(look.dt)):
+        gap = abs(wrap(look.z[k, 1] - azimuth))
+        if usable[k] and gap <= reach:
+            best, reach = k, gap
+    return best
+
+
+@njit(cache=True)
+def place_beside(
+    tr: Tracks,
+    host: int,
+    s: Settings,
+    sensor: SensorTable,
+    look: Look,
+    k: int,
+    z: FloatArray,
+    gap: float,
+    noise: float,
+) -> None:
+    """Add a track `gap` (rad) in azimuth from `host`, which is at `z` (range, azimuth, elevation, sensor axes)."""
+    d = s.d
+    n = tr.x.shape[1]
+    E = look.enu_from_sensor[k]
+    along = np.empty(3)
+    across = np.empty(3)
+    az, ce, se = z[1] + gap, math.cos(z[2]), math.sin(z[2])
+    for a in range(3):
+        along[a] = E[a, 0] * ce * math.sin(az) + E[a, 1] * ce * math.cos(az) + E[a, 2] * se
+        across[a] = E[a, 0] * math.cos(az) - E[a, 1] * math.sin(az)
+    wide = OFFSET_LEAST**2 + (z[0] * noise) ** 2
+    deep = (0.5 * s.blob) ** 2
+    i = tr.live[0]
+    tr.live[0] += 1
+    x, P = tr.x[i], tr.P[i]
+    x[:] = 0.0
+    P[:, :] = 0.0
+    for j in range(n - 2 * d - s.n_constant):
+        P[2 * d + j, 2 * d + j] = s.bias_sigma[j] ** 2
+    tell(tr, i, s, pooled_constants(tr, s))
+    tr.anchor[i] = 0.0
+    tr.anchor_P[i] = 0.0
+    tr.beside[i] = tr.birth[host]
+    for a in range(d):
+        tr.anchor[i, a] = look.sensor_position[k, a] + z[0] * along[a] - tr.x[host, a]
+        for b in range(d):
+            tr.anchor_P[i, a, b] = deep * along[a] * along[b] + wide * across[a] * across[b]
+    join(tr, i, host, s)
+    w = tr.weight[i]
+    w[:] = 0.0
+    w[VISIBLE] = s.blob_share
+    w[NOTHING] = 1.0 - s.blob_share
+    tr.birth[i] = look.row[k]
+    tr.heard[i] = 0
+    tr.life[i, 0] = look.t + look.dt[k]
+    tr.life[i, 1] = tr.life[i, 0]
+    tr.life[i, 2] = 0.0
+    tr.life[i, 3] = 1.0
+
+
+@njit(cache=True)
+def follow_blob(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, fix: FloatArray, k: int) -> None:
+    """Keep a track that was not detected alone near the detection `k` at `fix` (3,) that may hold it too.
+
+    Along the line of sight and across it, a variance that has grown beyond that of the blob (half its size) comes down
+    to it and never lower: the second look at a blob says nothing that the first did not. Where only bearings placed
+    the track, across is theirs.
+    """
+    d = s.d
+    n = tr.x.shape[1]
+    east, north = fix[0] - look.sensor_position[k, 0], fix[1] - look.sensor_position[k, 1]
+    far = max(math.hypot(east, north), 1e-9)
+    axis = np.zeros(d)
+    for turn in range(1 if tr.heard[i] == 0 else 2):
+        axis[0], axis[1] = (east / far, north / far) if turn == 0 else (north / far, -east / far)
+        Pa = np.zeros(n)
+        for a in range(n):
+            for b in range(d):
+                Pa[a] += tr.P[i, a, b] * axis[b]
+        variance = 0.0
+        off = 0.0
+        for a in range(d):
+            variance += axis[a] * Pa[a]
+            off += axis[a] * (fix[a] - tr.x[i, a])
+        wanted = (0.5 * sensor.resolution) ** 2
+        if variance > wanted:
+            gain = (1.0 - wanted / variance) / variance
+            for a in range(n):
+                tr.x[i, a] += gain * Pa[a] * off
+                for b in range(n):
+                    tr.P[i, a, b] -= gain * Pa[a] * Pa[b]
+
+
+@njit(cache=True)
+def keep_beside(
+    tr: Tracks, s: Settings, sensor: SensorTable, look: Look, col_of_row: IntArray, usable: NDArray[np.bool_]
+) -> None:
+    """Move the tracks that only bearings tell of along with the track beside which they stand, and end lost ones.
+
+    Their place relative to it (`anchor`) is measured by the difference of two bearings of one look, in which what both
+    have in common cancels. One that is not beside it any more, or would be one with it, is nothing.
+    """
+    z = np.empty(7)
+    h6 = np.empty((7, 6))
+    work = np.zeros((2, 3))
+    last = len(look.dt)
+    for i in range(tr.live[0]):
+        if tr.heard[i] != 0:
+            continue
+        host = -1
+        for j in range(tr.live[0]):
+            if tr.birth[j] == tr.beside[i] and tr.life[j, 2] > 0.0:
+                host = j
+        if host >= 0 and not sensor.ranging and i < len(col_of_row) and col_of_row[i] >= 0:
+            work[0, : s.d] = tr.x[host, : s.d]
+            measure(work[0], work[1], look.sensor_position[last], look.sensor_velocity[last],
+                    look.enu_from_sensor[last], z, h6)  # fmt: skip
+            own = nearest_bearing(look, usable, z[1], math.atan2(s.blob, z[0]))
+            if own >= 0 and own != col_of_row[i]:
+                shift(tr, i, s, sensor, look, col_of_row[i], own, z)
+        gap = 0.0
+        for a in range(s.d):
+            gap += tr.anchor[i, a] ** 2
+        if host < 0 or not s.merge_distance**2 <= gap <= (1.5 * s.blob) ** 2:
+            tr.weight[i, :] = 0.0
+            tr.weight[i, NOTHING] = 1.0
+        else:
+            join(tr, i, host, s)
+
+
+@njit(cache=True)
+def shift(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int, own: int, z: FloatArray) -> None:
+    """Measure how far track `i` stands across the line of sight from the one at `z` that has bearing `own`."""
+    E = look.enu_from_sensor[k]
+    across = np.zeros(s.d)
+    Pa = np.zeros(s.d)
+    measured = z[0] * math.sin(wrap(look.z[k, 1] - look.z[own, 1]))
+    for a in range(s.d):
+        across[a] = E[a, 0] * math.cos(z[1]) - E[a, 1] * math.sin(z[1])
+        measured -= across[a] * tr.anchor[i, a]
+    variance = 0.0
+    for a in range(s.d):
+        for b in range(s.d):
+            Pa[a] += tr.anchor_P[i, a, b] * across[b]
+        variance += across[a] * Pa[a]
+    # errors that wander slowly: together these looks are worth no more than OFFSET_LEAST
+    gain = 1.0 / (variance + 10.0 * OFFSET_LEAST**2)
+    for a in range(s.d):
+        tr.anchor[i, a] += gain * Pa[a] * measured
+    if variance > OFFSET_LEAST**2:
+        for a in range(s.d):
+            for b in range(s.d):
+                tr.anchor_P[i, a, b] -= gain * Pa[a] * Pa[b]
+
+
+@njit(cache=True)
+def join(tr: Tracks, i: int, host: int, s: Settings) -> None:
+    """Put track `i` at its place beside `host`, moving as that does."""
+    d = s.d
+    for a in range(d):
+        tr.x[i, a] = tr.x[host, a] + tr.anchor[i, a]
+        tr.x[i, d + a] = tr.x[host, d + a]
+        for b in range(d):
+            tr.P[i, a, b] = tr.P[host, a, b] + tr.anchor_P[i, a, b]
+            tr.P[i, d + a, d + b] = tr.P[host, d + a, d + b]
+            tr.P[i, a, d + b] = tr.P[host, a, d + b]
+            tr.P[i, d + b, a] = tr.P[host, a, d + b]
+        tr.P[i, d + a, d + a] += (VELOCITY_SHARE * s.speed_sigma) ** 2
