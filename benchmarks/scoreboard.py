@@ -104,7 +104,8 @@ def scored(data: dict[int, Recording], config: TrackerConfig, sensors: list[str]
         run(tracker, scans[:20])  # kernels loaded
         past: list[Rows] = []
         started = time.process_time()
-        _, made, _ = run(tracker, scans, watch=lambda _, out: past.extend(out.smoothed))  # noqa: B023
+        watch = None if config.smoothing_lag is None else lambda _, out: past.extend(out.smoothed)  # noqa: B023
+        _, made, _ = run(tracker, scans, watch=watch)  # watched, it goes look by look
         seconds.append(time.process_time() - started)
         scores.append(score(recording, track_rows(made if config.smoothing_lag is None else past), None, sensors))
     return scores, seconds
