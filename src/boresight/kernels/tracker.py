@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from boresight.types.sensor import FloatArray
 
 IntArray = NDArray[np.int64]
+# None leaves what few recordings need out of the compiled code, which takes half as long then
+Extras = bool | None
 
 VISIBLE, HIDDEN, STATIC, NOTHING = 0, 1, 2, 3
 # codes of what became of a detection

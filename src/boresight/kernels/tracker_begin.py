@@ -16,6 +16,7 @@ from boresight.kernels.tracker import (
     NOTHING,
     STATIC,
     VISIBLE,
+    Extras,
     IntArray,
     Look,
     SensorTable,
@@ -39,6 +40,7 @@ def begin(
     row_of_col: IntArray,
     usable: NDArray[np.bool_],
     at: Places,
+    extras: Extras,
 ) -> None:
     """Begin a track at every detection with a position that no track took."""
     d = s.d
@@ -48,7 +50,9 @@ def begin(
         for k in range(len(look.dt)):
             spare += 1.0 if usable[k] else 0.0
         tr.undetected[0] = max(tr.undetected[0], spare - tr.clutter[sensor.number, AZIMUTH_BINS])
-    pooled = pooled_constants(tr, s)
+    pooled = tr.bank
+    if extras is not None:
+        pooled = pooled_constants(tr, s)
     expected = tr.undetected[0] * sensor.p_detection
     tr.undetected[0] += s.birth_rate - expected
     for k in range(len(look.dt)):
@@ -64,7 +68,8 @@ def begin(
         tr.anchor_P[i] = 0.0
         for j in range(n - 2 * d - s.n_constant):
             P[2 * d + j, 2 * d + j] = s.bias_sigma[j] ** 2
-        tell(tr, i, s, pooled)
+        if extras is not None:
+            tell(tr, i, s, pooled)
         for e in range(3):  # position covariance from noise and bias, and what it shares with the bias
             b = sensor.bias[mask[e]]
             for a in range(d):
@@ -89,7 +94,7 @@ def begin(
                         shared += J[a, e] * P[bias, bias] * J[b, e]
                 P[a, b] = acc + shared + ((dt * s.speed_sigma) ** 2 if a == b else 0.0)
                 tr.anchor_P[i, a, b] = acc
-        if sensor.registers:
+        if extras is not None and sensor.registers:
             apply_constants(tr, i, s, look, k, sensor, fix, J, mask)
         density = tr.clutter[sensor.number, AZIMUTH_BINS]
         born = max(expected / (expected + density), 5.0 * s.delete_below)

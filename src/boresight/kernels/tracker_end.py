@@ -7,13 +7,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from boresight.kernels.options import LEAF
-from boresight.kernels.tracker import HIDDEN, STATIC, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
+from boresight.kernels.tracker import HIDDEN, STATIC, VISIBLE, Extras, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_begin import save_lesson
 from boresight.kernels.tracker_copies import put1, put2, put3
 
 
 @njit(cache=True)
-def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look) -> None:
+def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look, extras: Extras) -> None:
     """Show the tracks that are probably moving targets within the range for which the sensor answers."""
     last = len(look.dt)
     for i in range(tr.live[0]):
@@ -23,7 +23,8 @@ def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look) -> None:
         target = tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN]
         if tr.life[i, 2] > 0.0:
             if sensor.report_range == s.farthest_report and gap > (1.1 * sensor.report_range) ** 2:
-                save_lesson(tr, i, s)
+                if extras is not None:
+                    save_lesson(tr, i, s)
                 tr.life[i, 2] = 0.0
         elif target > s.show_above and gap < sensor.report_range**2 and (tr.heard[i] == 0 or stands_apart(tr, i, s)):
             tr.life[i, 2] = 1.0
@@ -43,7 +44,7 @@ def stands_apart(tr: Tracks, i: int, s: Settings) -> bool:
 
 
 @njit(cache=True)
-def end_and_merge(tr: Tracks, s: Settings, merging: bool, start: IntArray) -> None:
+def end_and_merge(tr: Tracks, s: Settings, merging: bool, start: IntArray, extras: Extras) -> None:
     """Drop tracks that are probably nothing, and the weaker of two that have become one.
 
     `start` is the candidate list of this look: a track whose gate holds many detections needs the more weight to live,
@@ -57,11 +58,11 @@ def end_and_merge(tr: Tracks, s: Settings, merging: bool, start: IntArray) -> No
         crowd = start[i + 1] - start[i] if i + 1 < len(start) else 1
         keep[i] = target + w[STATIC] >= s.delete_below * max(1, crowd)
         if not keep[i] or target < s.hide_below:
-            if tr.life[i, 2] > 0.0:
+            if tr.life[i, 2] > 0.0 and extras is not None:
                 save_lesson(tr, i, s)
             tr.life[i, 2] = 0.0
     if merging:
-        merge(tr, s, keep)
+        merge(tr, s, keep, extras)
     at = 0
     for i in range(n_tracks):
         if keep[i]:
@@ -87,7 +88,7 @@ def move(tr: Tracks, i: int, to: int) -> None:
 
 
 @njit(cache=True)
-def merge(tr: Tracks, s: Settings, keep: NDArray[np.bool_]) -> None:
+def merge(tr: Tracks, s: Settings, keep: NDArray[np.bool_], extras: Extras) -> None:
     """Take the weaker of two tracks that have become one out of `keep`."""
     order = np.argsort(tr.x[: tr.live[0], 0])  # neighbours lie next to each other in the east
     for a in range(len(order)):
@@ -99,7 +100,8 @@ def merge(tr: Tracks, s: Settings, keep: NDArray[np.bool_]) -> None:
             if keep[j] and are_one(tr, i, j, s):
                 weaker = j if rank(tr, i) >= rank(tr, j) else i
                 keep[weaker] = False
-                save_lesson(tr, weaker, s)
+                if extras is not None:
+                    save_lesson(tr, weaker, s)
 
 
 @njit(**LEAF)

@@ -14,6 +14,7 @@ from boresight.kernels.tracker import (
     OUTSIDE,
     UNASSOCIATED,
     UPDATED,
+    Extras,
     IntArray,
     Look,
     SensorTable,
@@ -34,12 +35,19 @@ from boresight.types.sensor import FloatArray
 
 @njit(**COUNTED)
 def scan_step(
-    tr: Tracks, s: Settings, sensor: SensorTable, look: Look, fate: IntArray, owner: IntArray, nis_of: FloatArray
+    tr: Tracks,
+    s: Settings,
+    sensor: SensorTable,
+    look: Look,
+    fate: IntArray,
+    owner: IntArray,
+    nis_of: FloatArray,
+    extras: Extras,
 ) -> None:
     """Take one scan: predict, gate, assign, update, weigh, begin and end tracks; `fate`, `owner`, `nis_of` are (m,).
 
     `owner` is the birth row of the track that a detection updated, began, or was nearest to (-1: none). The arrays of
-    `tr` must have room for m more tracks.
+    `tr` must have room for m more tracks. Without `extras` there are no constant errors, shares, or second bearings.
     """
     predict_all(tr, s, look.t)
     m = len(look.dt)
@@ -74,8 +82,9 @@ def scan_step(
     if sensor.decorrelation > 0.0:
         temper = min(1.0, max(elapsed, 0.0) / sensor.decorrelation)
     tr.last_look[sensor.number] = look.t
-    joint = sensor.joint or (s.blob_share > 0.0 and not sensor.ranging and unplaced(tr))
-    share = shares(tr, s, start, column, loglik, p_d, m) if joint else loglik
+    share = loglik
+    if extras is not None and (sensor.joint or (s.blob_share > 0.0 and not sensor.ranging and unplaced(tr))):
+        share = shares(tr, s, start, column, loglik, p_d, m)
     for i in range(n_tracks):
         if p_d[i] <= 0.0 and look.t - tr.life[i, 1] > s.survival_time:
             tr.weight[i] = 0.0  # out of sight, and no sensor has reported it for longer than targets last
@@ -105,23 +114,24 @@ def scan_step(
         if blob >= 0:
             if at.there[blob]:
                 follow_blob(tr, i, s, sensor, look, at.fix[blob], blob)
-        elif sensor.joint or (tr.heard[i] == 0 and not sensor.ranging):
+            continue
+        if extras is not None and (sensor.joint or (tr.heard[i] == 0 and not sensor.ranging)):
             take_shares(tr, i, s, sensor, look, at, room, start, column, share, k, p_d[i], temper)
-        elif k >= 0:
+            continue
+        if k >= 0:
             take(tr, i, s, sensor, look, k, at, room, evidence(i, start, column, loglik, row_of_col, p_d[i]), temper)
         else:
             log_any = evidence(i, start, column, loglik, row_of_col, p_d[i])
             weigh(tr, i, log_any, log_any, temper)
-    if s.blob_share > 0.0:
+    if extras is not None and s.blob_share > 0.0:
         keep_beside(tr, s, sensor, look, col_of_row, usable)
     learn_clutter(tr, s, sensor, look, claims, row_of_col, usable)
     if sensor.ranging:
-        begin(tr, s, sensor, look, fate, owner, row_of_col, usable, at)
-    elif s.blob_share > 0.0:
+        begin(tr, s, sensor, look, fate, owner, row_of_col, usable, at, extras)
+        show(tr, s, sensor, look, extras)
+    elif extras is not None and s.blob_share > 0.0:
         begin_beside(tr, s, sensor, look, fate, owner, usable)
-    if sensor.ranging:
-        show(tr, s, sensor, look)
-    end_and_merge(tr, s, sensor.ranging, start)
+    end_and_merge(tr, s, sensor.ranging, start, extras)
     tr.live[1] += 1
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from numba import njit
 
 from boresight.kernels.options import BARE
-from boresight.kernels.tracker import IntArray, SensorTable, Settings, Tracks
+from boresight.kernels.tracker import Extras, IntArray, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_copies import Copies, keep, restore
 from boresight.kernels.tracker_looks import NO_SENSOR, Looks, look_at, sensor_at
 from boresight.kernels.tracker_rows import (
@@ -66,6 +66,7 @@ def advance(
     period: FloatArray,
     coast_after: float,
     rows: RowTable,
+    extras: Extras,
 ) -> int:
     """Take looks in order of arrival, in place; returns the place of the first for which there was no room.
 
@@ -77,6 +78,7 @@ def advance(
         length: of the window (s).
         clock, period, coast_after: when rows are due (`tracker_rows`).
         rows: gets the rows due on the way.
+        extras: as `tracker_scan.scan_step` takes it.
     """
     order = queue.order
     for k in range(begin, len(looks.t)):
@@ -115,7 +117,7 @@ def advance(
                 keep(copies, tr, looks.t[next_], looks.number[next_])
             a, b = looks.first[next_], looks.first[next_ + 1]
             sensor = sensor_at(sensors, looks.sensor[next_])
-            scan_step(tr, s, sensor, look_at(looks, next_), fates.code[a:b], fates.owner[a:b], fates.nis[a:b])
+            scan_step(tr, s, sensor, look_at(looks, next_), fates.code[a:b], fates.owner[a:b], fates.nis[a:b], extras)
     return len(looks.t)
 
 

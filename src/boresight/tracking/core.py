@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from boresight.kernels.registration import AZIMUTH, ELEVATION, N_PARAMETERS, RANGE, SCALE, TIME
-from boresight.kernels.tracker import AZIMUTH_BINS, SensorTable, Settings, Tracks
+from boresight.kernels.tracker import AZIMUTH_BINS, Extras, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_copies import EACH, WHOLE, Copies, no_copies
 from boresight.kernels.tracker_looks import columns_of
 from boresight.tracking.config import SensorErrors, TrackerConfig
@@ -34,6 +34,7 @@ class Plan(NamedTuple):
     n_states: int
     columns: SensorTable  # all sensors in one table, with a leading axis
     empty: Copies  # one: the tracks before the first look
+    extras: Extras  # None where the kernel can do without what takes long to compile
 
 
 def make_plan(
@@ -125,7 +126,8 @@ def make_plan(
         blob_share=config.blob_share,
     )
     n = 2 * d + len(sigma)
-    return Plan(settings, tuple(tables), n, columns_of(tuple(tables)), _before_all(settings, tables, n))
+    extras = bool(known or config.blob_share > 0.0 or any(t.joint for t in tables)) or None
+    return Plan(settings, tuple(tables), n, columns_of(tuple(tables)), _before_all(settings, tables, n), extras)
 
 
 def _constants(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[int, float]]:

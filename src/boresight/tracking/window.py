@@ -73,7 +73,7 @@ def take(
     while True:
         done = advance(
             window.tracks, window.copies, plan.empty, plan.settings, plan.columns, every, fates, queue, done, length,
-            window.clock, period, coast_after, rows,
+            window.clock, period, coast_after, rows, plan.extras,
         )  # fmt: skip
         if done == held + new:
             break
@@ -85,7 +85,7 @@ def take(
     limit = _needed(window.copies, every, order, length, keep_after)
     rejected = held + np.flatnonzero((fates.outcome[held:] != TAKEN) & (every.sensor[held:] != NO_SENSOR))
     gone = np.concatenate([rejected, order[:limit]])
-    if not len(gone) and (order == np.arange(held + new)).all():  # all stay, in this order
+    if not len(gone) and np.array_equal(order, np.arange(held + new)):  # all stay, in this order
         window.looks, window.fates = every, fates
         return rows, Left(*_NOTHING)
     window.looks, window.fates = _part(every, fates, order[limit:])
