@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from boresight.kernels.measurement import measure, wrap
+from boresight.kernels.options import LEAF
 from boresight.kernels.tracker import (
     INITIATED,
     NOTHING,
@@ -29,10 +30,13 @@ OFFSET_LEAST = 5.0  # m: bearings of one target err by as much together, however
 VELOCITY_SHARE = 0.25  # of the prior speed: how two targets in one blob may differ
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def unplaced(tr: Tracks) -> bool:
     """Whether there is a track that only bearings have told of."""
-    return bool((tr.heard[: tr.live[0]] == 0).any())
+    found = False
+    for i in range(tr.live[0]):
+        found = found or tr.heard[i] == 0
+    return found
 
 
 @njit(cache=True)
@@ -45,13 +49,16 @@ def begin_beside(
     blob's range with half its size as spread. Nothing begins where another track nearby accounts for the bearing.
     """
     last = len(look.dt)
+    if last < 2:
+        return
     z = np.empty(7)
     h6 = np.empty((7, 6))
     work = np.zeros((2, 3))
     for host in range(tr.live[0]):
         if tr.life[host, 2] == 0.0 or tr.heard[host] == 0 or accompanied(tr, host, s):
             continue
-        work[0, : s.d] = tr.x[host, : s.d]
+        for a in range(s.d):
+            work[0, a] = tr.x[host, a]
         measure(work[0], work[1], look.sensor_position[last], look.sensor_velocity[last],
                 look.enu_from_sensor[last], z, h6)  # fmt: skip
         if not within(z[0], z[1], z[2], sensor, 0.0):
@@ -72,7 +79,7 @@ def begin_beside(
                 break
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def accompanied(tr: Tracks, host: int, s: Settings) -> bool:
     """Whether a track that may be something stands where a second target in the blob of `host` could be."""
     for j in range(tr.live[0]):
@@ -86,7 +93,7 @@ def accompanied(tr: Tracks, host: int, s: Settings) -> bool:
     return False
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def nearest_bearing(look: Look, usable: NDArray[np.bool_], azimuth: float, reach: float) -> int:
     """Return the detection whose azimuth is nearest to `azimuth`, -1 where none is within `reach` (rad)."""
     best = -1
@@ -191,6 +198,8 @@ def keep_beside(
     Their place relative to it (`anchor`) is measured by the difference of two bearings of one look, in which what both
     have in common cancels. One that is not beside it any more, or would be one with it, is nothing.
     """
+    if not unplaced(tr):
+        return
     z = np.empty(7)
     h6 = np.empty((7, 6))
     work = np.zeros((2, 3))
@@ -203,7 +212,8 @@ def keep_beside(
             if tr.birth[j] == tr.beside[i] and tr.life[j, 2] > 0.0:
                 host = j
         if host >= 0 and not sensor.ranging and i < len(col_of_row) and col_of_row[i] >= 0:
-            work[0, : s.d] = tr.x[host, : s.d]
+            for a in range(s.d):
+                work[0, a] = tr.x[host, a]
             measure(work[0], work[1], look.sensor_position[last], look.sensor_velocity[last],
                     look.enu_from_sensor[last], z, h6)  # fmt: skip
             own = nearest_bearing(look, usable, z[1], math.atan2(s.blob, z[0]))
@@ -244,7 +254,7 @@ def shift(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: i
                 tr.anchor_P[i, a, b] -= gain * Pa[a] * Pa[b]
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def join(tr: Tracks, i: int, host: int, s: Settings) -> None:
     """Put track `i` at its place beside `host`, moving as that does."""
     d = s.d
