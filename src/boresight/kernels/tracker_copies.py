@@ -130,21 +130,23 @@ def no_copies(tr: Tracks) -> Copies:
 
 def copies_with_room(copies: Copies, count: int, tracks: int) -> Copies:
     """Return the copies in arrays for at least `count` of them and so many tracks in all."""
-    size = dict.fromkeys(("t", "number", *WHOLE), count) | {"first": count + 1} | dict.fromkeys(EACH, tracks)
-    return Copies(used=copies.used, **{name: longer(getattr(copies, name), n) for name, n in size.items()})
+    used = int(copies.used[0])
+    few, many = (used, count), (int(copies.first[used]), tracks)
+    size = dict.fromkeys(("t", "number", *WHOLE), few) | {"first": (used + 1, count + 1)} | dict.fromkeys(EACH, many)
+    return Copies(used=copies.used, **{name: longer(getattr(copies, name), *n) for name, n in size.items()})
 
 
 def tracks_with_room(tr: Tracks, size: int) -> Tracks:
     """Return the tracks in arrays for at least `size` of them."""
-    return tr._replace(**{name: longer(getattr(tr, name), size) for name in EACH})
+    return tr._replace(**{name: longer(getattr(tr, name), int(tr.live[0]), size) for name in EACH})
 
 
-def longer(array: NDArray[Any], size: int) -> NDArray[Any]:
-    """Return an array for at least `size` rows that begins with those there are."""
+def longer(array: NDArray[Any], used: int, size: int) -> NDArray[Any]:
+    """Return an array for at least `size` rows, the first `used` as they are."""
     if size <= len(array):
         return array
     out = np.zeros((size, *array.shape[1:]), array.dtype)
-    out[: len(array)] = array
+    out[:used] = array[:used]
     return out
 
 

@@ -54,7 +54,9 @@ def row_table(size: int, d: int) -> RowTable:
 
 def rows_with_room(rows: RowTable, size: int) -> RowTable:
     """Return the rows in arrays for at least `size` of them."""
-    return rows._replace(**{name: longer(getattr(rows, name), size) for name in RowTable._fields[1:]})
+    return rows._replace(
+        **{name: longer(getattr(rows, name), int(rows.used[0]), size) for name in RowTable._fields[1:]}
+    )
 
 
 @njit(**BARE)

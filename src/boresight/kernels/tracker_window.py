@@ -163,7 +163,10 @@ def _has_room(
         live += looks.first[i + 1] - looks.first[i]
         again += 1
     wanted = queue.wanted
-    wanted[0], wanted[1], wanted[3] = live, c + again + 2, rows.used[0] + times * live
-    wanted[2] = copies.first[c] + (again + 2) * live
+    wanted[0], wanted[3] = live, rows.used[0] + times * tr.live[0]
+    if again == 0:  # one copy at most, of the tracks as they are
+        wanted[1], wanted[2] = copies.used[0] + 1, copies.first[copies.used[0]] + tr.live[0]
+    else:
+        wanted[1], wanted[2] = c + again + 2, copies.first[c] + (again + 2) * live
     enough = wanted[0] <= len(tr.birth) and wanted[1] <= len(copies.t)
     return bool(enough and wanted[2] <= len(copies.birth) and wanted[3] <= len(rows.t))

@@ -77,7 +77,7 @@ def take(
         )  # fmt: skip
         if done == held + new:
             break
-        tracks, count, copied, written = (2 * int(n) for n in queue.wanted)
+        tracks, count, copied, written = (int(1.5 * n) + 16 for n in queue.wanted)
         window.tracks = tracks_with_room(window.tracks, tracks)
         window.copies = copies_with_room(window.copies, count, copied)
         rows = rows_with_room(rows, written)
