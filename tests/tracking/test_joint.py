@@ -13,7 +13,7 @@ from boresight.errors import UserError
 from boresight.io.scans import iter_scans
 from boresight.kernels.tracker import Look
 from boresight.kernels.tracker_joint import mix, shares
-from boresight.kernels.tracker_split import follow_blob
+from boresight.kernels.tracker_weigh import follow_blob
 from boresight.kernels.tracker_workroom import workroom
 from boresight.metrics.score import score
 from boresight.tracking.config import SensorErrors, TrackerConfig

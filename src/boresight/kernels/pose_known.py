@@ -14,6 +14,13 @@ IntArray = NDArray[np.int64]
 
 
 @njit(cache=True)
+def stamps_for(times: FloatArray, nodes: FloatArray, known: float, limits: tuple[float, float]) -> int:
+    """Return how many stamps are known until `known` (s), 0 where a pose at one of the `times` cannot come of them."""
+    n = int(np.searchsorted(nodes, known, side="right"))
+    return n if n > 0 and first_uncovered(nodes[:n], times, limits[0], limits[1])[0] < 0 else 0
+
+
+@njit(cache=True)
 def known_positions(
     nodes: FloatArray,
     position: FloatArray,
@@ -38,11 +45,9 @@ def known_positions(
     p, v = np.zeros((len(t), 3)), np.zeros((len(t), 3))
     for i in range(len(known)):
         times = t[first[i] : first[i + 1]]
-        n = np.searchsorted(nodes, known[i], side="right")
-        if n == 0 or first_uncovered(nodes[:n], times, limits[0], limits[1])[0] >= 0:
-            continue
-        good[i] = True
-        if len(times) == 0:
+        n = stamps_for(times, nodes, known[i], limits)
+        good[i] = n > 0
+        if n == 0 or len(times) == 0:
             continue
         base = max(segment(nodes[:n], times.min()) - 1, 0)
         recent = np.searchsorted(nodes, known[i] - window)
@@ -78,11 +83,9 @@ def known_attitudes(
     R, rate = np.zeros((len(t), 3, 3)), np.zeros((len(t), 3))
     for i in range(len(known)):
         times = t[first[i] : first[i + 1]]
-        n = np.searchsorted(nodes, known[i], side="right")
-        if n == 0 or first_uncovered(nodes[:n], times, limits[0], limits[1])[0] >= 0:
-            continue
-        good[i] = True
-        if len(times) == 0:
+        n = stamps_for(times, nodes, known[i], limits)
+        good[i] = n > 0
+        if n == 0 or len(times) == 0:
             continue
         base = max(min(segment(nodes[:n], times.min()), n - 4), 0)
         found = interpolate_attitude(nodes[base:n], quaternion[base:n], steps[base : max(n - 1, base)], times)

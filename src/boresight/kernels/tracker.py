@@ -1,9 +1,9 @@
-"""The tracker's inner loop: predict, gate, assign, update and weigh all tracks for one scan.
+"""What the tracker's kernels work on: tracks, one look, sensors and settings as arrays and numbers.
 
-A track is a row of the arrays in `Tracks`. Its state is position (d), velocity (d), then one Gauss–Markov bias for
-each component of each sensor whose errors are declared to be coloured. Beside it stand four weights, the
-probabilities that the track is (0) a target that the sensors can see, (1) a target hidden from them, (2) an object
-that does not move, (3) nothing at all.
+A track is a row of the arrays in `Tracks`. Its state is position (d), velocity (d), one Gauss–Markov bias for each
+component of each sensor whose errors are declared to be coloured, then the sensors' constant errors that are to be
+learned. Beside it stand four weights, the probabilities that the track is (0) a target that the sensors can see, (1) a
+target hidden from them, (2) an object that does not move, (3) nothing at all.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from boresight.types.sensor import FloatArray
 
 IntArray = NDArray[np.int64]
-# None leaves what few recordings need out of the compiled code, which takes half as long then
+# of constant errors, shared detections, second bearings: None leaves what few recordings need out of the compiled code,
+# which takes half as long then
 Extras = bool | None
 
 VISIBLE, HIDDEN, STATIC, NOTHING = 0, 1, 2, 3

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from boresight.kernels.options import LEAF
 from boresight.kernels.registration import TIME, learned, pool
 from boresight.kernels.tracker import (
     AZIMUTH_BINS,
@@ -44,7 +45,6 @@ def begin(
 ) -> None:
     """Begin a track at every detection with a position that no track took."""
     d = s.d
-    n = tr.x.shape[1]
     if tr.live[1] == 0:  # a first look full of targets must not pass for clutter: take them at their number
         spare = 0.0
         for k in range(len(look.dt)):
@@ -59,15 +59,8 @@ def begin(
         if row_of_col[k] >= 0 or not at.there[k]:
             continue
         fix, J, R, mask = at.fix[k], at.J[k], at.R[k], at.mask[k]
-        i = tr.live[0]
-        tr.live[0] += 1
+        i = new_track(tr, s, look, k, 1 << (sensor.number % 62))
         x, P = tr.x[i], tr.P[i]
-        x[:] = 0.0
-        P[:, :] = 0.0
-        tr.anchor[i] = 0.0
-        tr.anchor_P[i] = 0.0
-        for j in range(n - 2 * d - s.n_constant):
-            P[2 * d + j, 2 * d + j] = s.bias_sigma[j] ** 2
         if extras is not None:
             tell(tr, i, s, pooled)
         for e in range(3):  # position covariance from noise and bias, and what it shares with the bias
@@ -103,16 +96,35 @@ def begin(
         w[HIDDEN] = 0.0
         w[STATIC] = born * s.static_share
         w[NOTHING] = 1.0 - born
-        tr.birth[i] = look.row[k]
-        tr.heard[i] = 1 << (sensor.number % 62)
-        tr.life[i, 0] = look.t + look.dt[k]
-        tr.life[i, 1] = tr.life[i, 0]
-        tr.life[i, 2] = 0.0
-        tr.life[i, 3] = 1.0
         fate[k] = INITIATED
         owner[k] = look.row[k]
         if math.isfinite(look.z[k, 3]):
             condition_on_rate(tr, i, s, sensor, look, k)
+
+
+@njit(**LEAF)
+def new_track(tr: Tracks, s: Settings, look: Look, k: int, heard: int) -> int:
+    """Return the row of a track that detection `k` begins: all zero but for the variance of the wandering biases."""
+    i = tr.live[0]
+    tr.live[0] += 1
+    n = tr.x.shape[1]
+    for a in range(n):
+        tr.x[i, a] = 0.0
+        for b in range(n):
+            tr.P[i, a, b] = 0.0
+    for j in range(2 * s.d, n - s.n_constant):
+        tr.P[i, j, j] = s.bias_sigma[j - 2 * s.d] ** 2
+    for a in range(3):
+        tr.anchor[i, a] = 0.0
+        for b in range(3):
+            tr.anchor_P[i, a, b] = 0.0
+    tr.birth[i] = look.row[k]
+    tr.heard[i] = heard
+    tr.life[i, 0] = look.t + look.dt[k]
+    tr.life[i, 1] = tr.life[i, 0]
+    tr.life[i, 2] = 0.0
+    tr.life[i, 3] = 1.0
+    return int(i)
 
 
 @njit(cache=True)

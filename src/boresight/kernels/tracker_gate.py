@@ -1,4 +1,4 @@
-"""Which detections each track could claim, and how dense false ones are: the candidate list of a look."""
+"""Which detections each track could claim: the candidate list of a look."""
 
 from __future__ import annotations
 
@@ -10,107 +10,14 @@ from numpy.typing import NDArray
 
 from boresight.kernels.options import LEAF
 from boresight.kernels.registration import TIME
-from boresight.kernels.tracker import (
-    AZIMUTH_BINS,
-    GATED,
-    HIDDEN,
-    NOTHING,
-    STATIC,
-    UNASSOCIATED,
-    IntArray,
-    Look,
-    SensorTable,
-    Settings,
-    Tracks,
-)
-from boresight.kernels.tracker_place import Places, fix_sensitivity, volume_of
-from boresight.kernels.tracker_state import components, innovation, linearise
+from boresight.kernels.tracker import GATED, UNASSOCIATED, IntArray, Look, SensorTable, Settings, Tracks
+from boresight.kernels.tracker_clutter import log_densities
+from boresight.kernels.tracker_place import Places, fix_sensitivity
+from boresight.kernels.tracker_state import components, existence, innovation, linearise
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
 LOG_2PI = math.log(2.0 * math.pi)
-
-
-@njit(**LEAF)
-def azimuth_bin(azimuth: float) -> int:
-    """Return the clutter-map bin of an azimuth (rad)."""
-    return int((azimuth + math.pi) / (2.0 * math.pi) * AZIMUTH_BINS) % AZIMUTH_BINS
-
-
-@njit(**LEAF)
-def clutter_density(tr: Tracks, s: Settings, sensor: SensorTable, z: FloatArray, mask: IntArray, m: int) -> float:
-    """Expected false detections per unit volume of the measured components around `z`, as learned so far."""
-    known = tr.clutter[sensor.number]
-    high = sensor.range_high
-    if not math.isfinite(high):  # nothing declared: twice what was seen, at least 100 s at the prior speed
-        high = max(2.0 * tr.seen_range[sensor.number], 100.0 * s.speed_sigma)
-    volume = volume_of(mask, m, sensor, high, s.d, s.speed_sigma)
-    if sensor.ranging:
-        return float(known[AZIMUTH_BINS] / volume)
-    share = 2.0 * math.pi / AZIMUTH_BINS / max(sensor.azimuth_span, 1e-9)
-    b = azimuth_bin(z[1])
-    local = (known[(b - 1) % AZIMUTH_BINS] + 2.0 * known[b] + known[(b + 1) % AZIMUTH_BINS]) / 4.0
-    return float(local / (volume * share))
-
-
-@njit(cache=True)
-def log_densities(tr: Tracks, s: Settings, sensor: SensorTable, look: Look, out: FloatArray) -> int:
-    """Fill the log clutter density at every detection (m,); returns the largest number of components."""
-    most = 0
-    mask = np.full(7, -1, np.int64)
-    before = np.full(7, -1, np.int64)
-    count = -1  # of the components before
-    value = 0.0
-    for k in range(len(look.dt)):
-        c = components(look.z[k], s.d, mask)
-        most = max(most, c)
-        # for ranging sensors it depends on which components are measured alone
-        same = sensor.ranging and c == count
-        for j in range(c):
-            same = same and mask[j] == before[j]
-            before[j] = mask[j]
-        count = c
-        if not same:
-            value = math.log(max(clutter_density(tr, s, sensor, look.z[k], mask, c), 1e-300))
-        out[k] = value
-    return most
-
-
-@njit(cache=True)
-def learn_clutter(
-    tr: Tracks,
-    s: Settings,
-    sensor: SensorTable,
-    look: Look,
-    claims: IntArray,
-    row_of_col: IntArray,
-    usable: NDArray[np.bool_],
-) -> None:
-    """Let the detections that no shown track took teach the mean number of false detections of a look."""
-    known = tr.clutter[sensor.number]
-    m = len(look.dt)
-    forget = 1.0 / s.clutter_memory
-    for b in range(AZIMUTH_BINS + 1):
-        known[b] *= 1.0 - forget
-    floor = 0.05 * sensor.clutter_per_scan
-    for k in range(m):
-        i = row_of_col[k]
-        far = look.z[k, 0] if math.isfinite(look.z[k, 0]) else math.hypot(look.z[k, 4], look.z[k, 5])
-        if far > tr.seen_range[sensor.number]:
-            tr.seen_range[sensor.number] = far
-        if not usable[k]:
-            continue
-        share = 1.0
-        if i < 0 and claims[k] > 0:
-            share = 0.0
-        elif i >= 0:
-            share = tr.weight[i, NOTHING] + tr.weight[i, STATIC] if sensor.ranging else tr.weight[i, NOTHING]
-        if not math.isnan(look.z[k, 1]):
-            known[azimuth_bin(look.z[k, 1])] += forget * share
-        known[AZIMUTH_BINS] += forget * share
-    known[AZIMUTH_BINS] = max(known[AZIMUTH_BINS], floor)
-    for b in range(AZIMUTH_BINS):
-        known[b] = max(known[b], floor / AZIMUTH_BINS)
 
 
 @njit(**LEAF)
@@ -205,10 +112,9 @@ def gate_all(
         start[i] = used
         if p_d[i] <= 0.0:
             continue
-        there = 1.0 - tr.weight[i, NOTHING] - tr.weight[i, HIDDEN]
-        p_there = max(min(there, 1.0 - 1e-9), s.doubt)
-        log_hit = math.log(p_there * p_d[i])
-        log_miss = math.log(1.0 - p_there * p_d[i])
+        there = existence(tr, i, s)
+        log_hit = math.log(there * p_d[i])
+        log_miss = math.log(1.0 - there * p_d[i])
         last_pose, last_kind = -1, 0
         first, last = 0, m
         reach = np.inf
@@ -238,8 +144,6 @@ def gate_all(
                     nis_of[k] = nis
             if nis > s.gates[c]:
                 continue
-            ll = -0.5 * (nis + logdet + c * LOG_2PI) - log_density[k]
-            value = log_miss - (log_hit + ll)
             if fate[k] == GATED:
                 fate[k] = UNASSOCIATED
             if used == size:
@@ -247,9 +151,9 @@ def gate_all(
                 column = grown_int(column, size)
                 cost, distance, loglik = grown(cost, size), grown(distance, size), grown(loglik, size)
             column[used] = k
-            cost[used] = value
             distance[used] = nis
-            loglik[used] = ll
+            loglik[used] = -0.5 * (nis + logdet + c * LOG_2PI) - log_density[k]
+            cost[used] = log_miss - (log_hit + loglik[used])
             used += 1
     start[n_tracks] = used
     return start, column[:used], cost[:used], distance[:used], loglik[:used]

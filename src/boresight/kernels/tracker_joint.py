@@ -12,11 +12,10 @@ import numpy as np
 from numba import njit
 
 from boresight.kernels.jpda import marginals
-from boresight.kernels.registration import TIME
-from boresight.kernels.tracker import HIDDEN, NOTHING, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
+from boresight.kernels.tracker import HIDDEN, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_place import Places
-from boresight.kernels.tracker_state import apply_update, components, innovation, linearise
-from boresight.kernels.tracker_weigh import allow_stop, moving_likelihood, static_likelihood, weigh
+from boresight.kernels.tracker_state import condition, existence, learners
+from boresight.kernels.tracker_weigh import moving_likelihood, note_hit, static_likelihood, weigh
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
@@ -38,7 +37,7 @@ def shares(
     miss = np.ones(n)
     there = np.empty(n)
     for i in range(n):
-        there[i] = max(min(1.0 - tr.weight[i, NOTHING] - tr.weight[i, HIDDEN], 1.0 - 1e-9), s.doubt)
+        there[i] = existence(tr, i, s)
         miss[i] = 1.0 - there[i] * p_d[i]
         for e in range(start[i], start[i + 1]):
             weight[e] = there[i] * p_d[i] * math.exp(min(loglik[e], 100.0))
@@ -81,12 +80,7 @@ def take_shares(
         mix(tr, i, s, sensor, look, room, start, column, share, visible)
     weigh(tr, i, math.log(visible), math.log(still), temper)
     if own >= 0:
-        if sensor.ranging:
-            allow_stop(tr, i, s)
-        if moves:
-            tr.heard[i] |= 1 << (sensor.number % 62)
-        tr.life[i, 1] = look.t + look.dt[own]
-        tr.life[i, 3] += 1.0
+        note_hit(tr, i, s, sensor, look.t + look.dt[own], moves)
 
 
 @njit(cache=True)
@@ -133,8 +127,7 @@ def mix(
     n = tr.x.shape[1]
     w = tr.weight[i]
     total = w[VISIBLE] * visible + w[HIDDEN]
-    alone = tr.heard[i] | 1 << (sensor.number % 62) == 1 << (sensor.number % 62)
-    learns = n - s.n_constant if alone else n
+    considered = learners(tr, i, s, sensor)
     prior = tr.x[i].copy()
     prior_P = tr.P[i].copy()
     mean = np.zeros(n)
@@ -144,12 +137,8 @@ def mix(
         beta = w[VISIBLE] * share[e] / max(total, 1e-300)
         if beta < LEAST_SHARE:
             continue
-        k = column[e]
         x, P = prior.copy(), prior_P.copy()
-        c = components(look.z[k], s.d, room.mask)
-        linearise(x, s.d, k, look.dt[k], look, sensor, c, room)
-        innovation(P, look.z[k], look.R[k], c, room, s.d, sensor.constant[TIME])
-        apply_update(x, P, c, room, learns)
+        condition(x, P, s.d, column[e], look, sensor, room, considered)
         step = x - prior
         mean += beta * step
         square += beta * (P + np.outer(step, step))

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from boresight.kernels.assignment import assign_sparse
 from boresight.kernels.options import COUNTED, LEAF
@@ -22,13 +23,14 @@ from boresight.kernels.tracker import (
     Tracks,
 )
 from boresight.kernels.tracker_begin import begin
+from boresight.kernels.tracker_clutter import learn_clutter
 from boresight.kernels.tracker_end import end_and_merge, show
-from boresight.kernels.tracker_gate import gate_all, learn_clutter
+from boresight.kernels.tracker_gate import gate_all
 from boresight.kernels.tracker_joint import shares, take_shares
 from boresight.kernels.tracker_place import covered, places_of, within
-from boresight.kernels.tracker_split import begin_beside, follow_blob, keep_beside, unplaced
+from boresight.kernels.tracker_split import begin_beside, keep_beside, unplaced
 from boresight.kernels.tracker_state import predict_all
-from boresight.kernels.tracker_weigh import evidence, merged, take, weigh
+from boresight.kernels.tracker_weigh import evidence, follow_blob, merged, take, weigh
 from boresight.kernels.tracker_workroom import workroom
 from boresight.types.sensor import FloatArray
 
@@ -53,13 +55,7 @@ def scan_step(
     m = len(look.dt)
     n_tracks = tr.live[0]
     usable = np.zeros(m, np.bool_)
-    for k in range(m):
-        fate[k] = UNASSOCIATED
-        owner[k] = -1
-        nis_of[k] = np.nan
-        usable[k] = covered(look.z[k], sensor)
-        if not usable[k]:
-            fate[k] = OUTSIDE
+    screen(look, sensor, usable, fate, owner, nis_of)
     at = places_of(look, s, sensor, usable)
     p_d = np.zeros(n_tracks)
     room = workroom(tr.x.shape[1])
@@ -72,29 +68,15 @@ def scan_step(
     for i in range(n_tracks):
         if col_of_row[i] >= 0:
             row_of_col[col_of_row[i]] = i
-    claims = np.zeros(m, np.int64)  # how many credible tracks could claim a detection
-    for i in range(n_tracks):
-        if tr.life[i, 2] > 0.0 or 1.0 - tr.weight[i, NOTHING] > 0.5:
-            for e in range(start[i], start[i + 1]):
-                claims[column[e]] += 1
-    elapsed = look.t - tr.last_look[sensor.number]
-    temper = 1.0
-    if sensor.decorrelation > 0.0:
-        temper = min(1.0, max(elapsed, 0.0) / sensor.decorrelation)
-    tr.last_look[sensor.number] = look.t
+    claims = np.zeros(m, np.int64)
+    count_claims(tr, start, column, claims)
+    temper = independence(tr, sensor, look.t)
     share = loglik
     if extras is not None and (sensor.joint or (s.blob_share > 0.0 and not sensor.ranging and unplaced(tr))):
         share = shares(tr, s, start, column, loglik, p_d, m)
     for i in range(n_tracks):
-        if p_d[i] <= 0.0 and look.t - tr.life[i, 1] > s.survival_time:
-            tr.weight[i] = 0.0  # out of sight, and no sensor has reported it for longer than targets last
-            tr.weight[i, NOTHING] = 1.0
-            continue
         if p_d[i] <= 0.0:
-            if tr.life[i, 3] < 2.0 and tr.heard[i] == 1 << (sensor.number % 62):
-                # begun at the very edge of the coverage, where it cannot be seen again: it must not wait there for ever
-                log_miss = math.log(1.0 - sensor.p_detection)
-                weigh(tr, i, log_miss, log_miss, temper)
+            pass_over(tr, i, s, sensor, look.t, temper)
             continue
         k = col_of_row[i]
         shy = s.lonely_bearings and not sensor.ranging and not sensor.joint and tr.heard[i] > 0
@@ -124,15 +106,62 @@ def scan_step(
             log_any = evidence(i, start, column, loglik, row_of_col, p_d[i])
             weigh(tr, i, log_any, log_any, temper)
     if extras is not None and s.blob_share > 0.0:
-        keep_beside(tr, s, sensor, look, col_of_row, usable)
+        keep_beside(tr, s, sensor, look, col_of_row, usable, room)
     learn_clutter(tr, s, sensor, look, claims, row_of_col, usable)
     if sensor.ranging:
         begin(tr, s, sensor, look, fate, owner, row_of_col, usable, at, extras)
         show(tr, s, sensor, look, extras)
     elif extras is not None and s.blob_share > 0.0:
-        begin_beside(tr, s, sensor, look, fate, owner, usable)
+        begin_beside(tr, s, sensor, look, fate, owner, usable, room)
     end_and_merge(tr, s, sensor.ranging, start, extras)
     tr.live[1] += 1
+
+
+@njit(**LEAF)
+def screen(
+    look: Look,
+    sensor: SensorTable,
+    usable: NDArray[np.bool_],
+    fate: IntArray,
+    owner: IntArray,
+    nis_of: FloatArray,
+) -> None:
+    """Fill which detections lie within the coverage, and what is known of the detections so far."""
+    for k in range(len(look.dt)):
+        usable[k] = covered(look.z[k], sensor)
+        fate[k] = UNASSOCIATED if usable[k] else OUTSIDE
+        owner[k] = -1
+        nis_of[k] = math.nan
+
+
+@njit(**LEAF)
+def count_claims(tr: Tracks, start: IntArray, column: IntArray, claims: IntArray) -> None:
+    """Add to `claims` (m,) how many credible tracks could claim each detection."""
+    for i in range(len(start) - 1):
+        if tr.life[i, 2] > 0.0 or 1.0 - tr.weight[i, NOTHING] > 0.5:
+            for e in range(start[i], start[i + 1]):
+                claims[column[e]] += 1
+
+
+@njit(**LEAF)
+def independence(tr: Tracks, sensor: SensorTable, t: float) -> float:
+    """Return how much of a look at time `t` (s) is new evidence since the sensor's last one, 0 to 1, and note it."""
+    elapsed = t - tr.last_look[sensor.number]
+    tr.last_look[sensor.number] = t
+    return min(1.0, max(elapsed, 0.0) / sensor.decorrelation) if sensor.decorrelation > 0.0 else 1.0
+
+
+@njit(**LEAF)
+def pass_over(tr: Tracks, i: int, s: Settings, sensor: SensorTable, t: float, temper: float) -> None:
+    """Weigh a track that this sensor cannot see at time `t` (s): it may not wait out of sight for ever."""
+    if t - tr.life[i, 1] > s.survival_time:  # no sensor has reported it for longer than targets last
+        for a in range(4):
+            tr.weight[i, a] = 0.0
+        tr.weight[i, NOTHING] = 1.0
+    elif tr.life[i, 3] < 2.0 and tr.heard[i] == 1 << (sensor.number % 62):
+        # begun at the very edge of the coverage, where it cannot be seen again
+        log_miss = math.log(1.0 - sensor.p_detection)
+        weigh(tr, i, log_miss, log_miss, temper)
 
 
 @njit(**LEAF)

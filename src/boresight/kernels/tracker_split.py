@@ -21,8 +21,9 @@ from boresight.kernels.tracker import (
     Settings,
     Tracks,
 )
-from boresight.kernels.tracker_begin import pooled_constants, tell
+from boresight.kernels.tracker_begin import new_track, pooled_constants, tell
 from boresight.kernels.tracker_place import within
+from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
 BELIEVED = 0.2  # least probability to be something with which a track accounts for a second bearing
@@ -41,7 +42,14 @@ def unplaced(tr: Tracks) -> bool:
 
 @njit(cache=True)
 def begin_beside(
-    tr: Tracks, s: Settings, sensor: SensorTable, look: Look, fate: IntArray, owner: IntArray, usable: NDArray[np.bool_]
+    tr: Tracks,
+    s: Settings,
+    sensor: SensorTable,
+    look: Look,
+    fate: IntArray,
+    owner: IntArray,
+    usable: NDArray[np.bool_],
+    room: Workroom,
 ) -> None:
     """Begin a track where two bearings stand within the angular extent that a shown track's blob may have.
 
@@ -51,16 +59,11 @@ def begin_beside(
     last = len(look.dt)
     if last < 2:
         return
-    z = np.empty(7)
-    h6 = np.empty((7, 6))
-    work = np.zeros((2, 3))
+    z = room.z
     for host in range(tr.live[0]):
         if tr.life[host, 2] == 0.0 or tr.heard[host] == 0 or accompanied(tr, host, s):
             continue
-        for a in range(s.d):
-            work[0, a] = tr.x[host, a]
-        measure(work[0], work[1], look.sensor_position[last], look.sensor_velocity[last],
-                look.enu_from_sensor[last], z, h6)  # fmt: skip
+        see(tr, host, s, look, room)
         if not within(z[0], z[1], z[2], sensor, 0.0):
             continue
         extent = math.atan2(s.blob, z[0])
@@ -77,6 +80,16 @@ def begin_beside(
                 fate[k] = INITIATED
                 owner[k] = look.row[k]
                 break
+
+
+@njit(**LEAF)
+def see(tr: Tracks, i: int, s: Settings, look: Look, room: Workroom) -> None:
+    """Fill `room.z` with where track `i` stands in the sensor's axes."""
+    last = len(look.dt)
+    for a in range(s.d):
+        room.sight[0, a] = tr.x[i, a]
+    own, moving, axes = look.sensor_position[last], look.sensor_velocity[last], look.enu_from_sensor[last]
+    measure(room.sight[0], room.sight[1], own, moving, axes, room.z, room.h6)
 
 
 @njit(**LEAF)
@@ -118,7 +131,6 @@ def place_beside(
 ) -> None:
     """Add a track `gap` (rad) in azimuth from `host`, which is at `z` (range, azimuth, elevation, sensor axes)."""
     d = s.d
-    n = tr.x.shape[1]
     E = look.enu_from_sensor[k]
     along = np.empty(3)
     across = np.empty(3)
@@ -128,16 +140,8 @@ def place_beside(
         across[a] = E[a, 0] * math.cos(az) - E[a, 1] * math.sin(az)
     wide = OFFSET_LEAST**2 + (z[0] * noise) ** 2
     deep = (0.5 * s.blob) ** 2
-    i = tr.live[0]
-    tr.live[0] += 1
-    x, P = tr.x[i], tr.P[i]
-    x[:] = 0.0
-    P[:, :] = 0.0
-    for j in range(n - 2 * d - s.n_constant):
-        P[2 * d + j, 2 * d + j] = s.bias_sigma[j] ** 2
+    i = new_track(tr, s, look, k, 0)
     tell(tr, i, s, pooled_constants(tr, s))
-    tr.anchor[i] = 0.0
-    tr.anchor_P[i] = 0.0
     tr.beside[i] = tr.birth[host]
     for a in range(d):
         tr.anchor[i, a] = look.sensor_position[k, a] + z[0] * along[a] - tr.x[host, a]
@@ -148,50 +152,17 @@ def place_beside(
     w[:] = 0.0
     w[VISIBLE] = s.blob_share
     w[NOTHING] = 1.0 - s.blob_share
-    tr.birth[i] = look.row[k]
-    tr.heard[i] = 0
-    tr.life[i, 0] = look.t + look.dt[k]
-    tr.life[i, 1] = tr.life[i, 0]
-    tr.life[i, 2] = 0.0
-    tr.life[i, 3] = 1.0
-
-
-@njit(cache=True)
-def follow_blob(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, fix: FloatArray, k: int) -> None:
-    """Keep a track that was not detected alone near the detection `k` at `fix` (3,) that may hold it too.
-
-    Along the line of sight and across it, a variance that has grown beyond that of the blob (half its size) comes down
-    to it and never lower: the second look at a blob says nothing that the first did not. Where only bearings placed
-    the track, across is theirs.
-    """
-    d = s.d
-    n = tr.x.shape[1]
-    east, north = fix[0] - look.sensor_position[k, 0], fix[1] - look.sensor_position[k, 1]
-    far = max(math.hypot(east, north), 1e-9)
-    axis = np.zeros(d)
-    for turn in range(1 if tr.heard[i] == 0 else 2):
-        axis[0], axis[1] = (east / far, north / far) if turn == 0 else (north / far, -east / far)
-        Pa = np.zeros(n)
-        for a in range(n):
-            for b in range(d):
-                Pa[a] += tr.P[i, a, b] * axis[b]
-        variance = 0.0
-        off = 0.0
-        for a in range(d):
-            variance += axis[a] * Pa[a]
-            off += axis[a] * (fix[a] - tr.x[i, a])
-        wanted = (0.5 * sensor.resolution) ** 2
-        if variance > wanted:
-            gain = (1.0 - wanted / variance) / variance
-            for a in range(n):
-                tr.x[i, a] += gain * Pa[a] * off
-                for b in range(n):
-                    tr.P[i, a, b] -= gain * Pa[a] * Pa[b]
 
 
 @njit(cache=True)
 def keep_beside(
-    tr: Tracks, s: Settings, sensor: SensorTable, look: Look, col_of_row: IntArray, usable: NDArray[np.bool_]
+    tr: Tracks,
+    s: Settings,
+    sensor: SensorTable,
+    look: Look,
+    col_of_row: IntArray,
+    usable: NDArray[np.bool_],
+    room: Workroom,
 ) -> None:
     """Move the tracks that only bearings tell of along with the track beside which they stand, and end lost ones.
 
@@ -200,10 +171,7 @@ def keep_beside(
     """
     if not unplaced(tr):
         return
-    z = np.empty(7)
-    h6 = np.empty((7, 6))
-    work = np.zeros((2, 3))
-    last = len(look.dt)
+    z = room.z
     for i in range(tr.live[0]):
         if tr.heard[i] != 0:
             continue
@@ -212,10 +180,7 @@ def keep_beside(
             if tr.birth[j] == tr.beside[i] and tr.life[j, 2] > 0.0:
                 host = j
         if host >= 0 and not sensor.ranging and i < len(col_of_row) and col_of_row[i] >= 0:
-            for a in range(s.d):
-                work[0, a] = tr.x[host, a]
-            measure(work[0], work[1], look.sensor_position[last], look.sensor_velocity[last],
-                    look.enu_from_sensor[last], z, h6)  # fmt: skip
+            see(tr, host, s, look, room)
             own = nearest_bearing(look, usable, z[1], math.atan2(s.blob, z[0]))
             if own >= 0 and own != col_of_row[i]:
                 shift(tr, i, s, sensor, look, col_of_row[i], own, z)

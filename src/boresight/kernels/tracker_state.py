@@ -9,7 +9,7 @@ from numba import njit
 
 from boresight.kernels.measurement import measure, measure_axes, wrap
 from boresight.kernels.options import LEAF
-from boresight.kernels.registration import N_PARAMETERS, sensitivity
+from boresight.kernels.registration import N_PARAMETERS, TIME, sensitivity
 from boresight.kernels.tracker import HIDDEN, NOTHING, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
@@ -67,6 +67,12 @@ def predict_all(tr: Tracks, s: Settings, t: float) -> None:
 
 
 @njit(**LEAF)
+def existence(tr: Tracks, i: int, s: Settings) -> float:
+    """Return the probability with which track `i` competes for detections: that it is there and not hidden."""
+    return float(max(min(1.0 - tr.weight[i, NOTHING] - tr.weight[i, HIDDEN], 1.0 - 1e-9), s.doubt))
+
+
+@njit(**LEAF)
 def linearise(
     x: FloatArray, d: int, k: int, dt: float, look: Look, sensor: SensorTable, count: int, room: Workroom
 ) -> None:
@@ -118,6 +124,27 @@ def components(z: FloatArray, d: int, mask: IntArray) -> int:
 
 
 @njit(**LEAF)
+def factor(A: FloatArray, m: int) -> None:
+    """Overwrite the lower triangle of a covariance, its first m rows, with its Cholesky factor."""
+    for i in range(m):
+        for j in range(i + 1):
+            acc = A[i, j]
+            for k in range(j):
+                acc -= A[i, k] * A[j, k]
+            A[i, j] = math.sqrt(max(acc, 1e-300)) if i == j else acc / A[j, j]
+
+
+@njit(**LEAF)
+def whiten(y: FloatArray, L: FloatArray, m: int) -> None:
+    """Overwrite the first m numbers of `y` with L⁻¹ y, `L` as `factor` leaves it."""
+    for i in range(m):
+        acc = y[i]
+        for k in range(i):
+            acc -= L[i, k] * y[k]
+        y[i] = acc / L[i, i]
+
+
+@njit(**LEAF)
 def innovation(
     P: FloatArray, z: FloatArray, R: FloatArray, m: int, room: Workroom, d: int, lag: int
 ) -> tuple[float, float]:
@@ -154,26 +181,36 @@ def innovation(
                         product = P[d + a, d + b] * P[lag, lag] + P[d + a, lag] * P[d + b, lag]
                         acc += H[mask[i], a] * product * H[mask[j], b]
             S[i, j] = acc
-    # in-place Cholesky and forward substitution
+    factor(S, m)
+    whiten(y, S, m)
     nis = 0.0
     logdet = 0.0
     for i in range(m):
-        for j in range(i + 1):
-            acc = S[i, j]
-            for k in range(j):
-                acc -= S[i, k] * S[j, k]
-            if i == j:
-                S[i, i] = math.sqrt(max(acc, 1e-300))
-            else:
-                S[i, j] = acc / S[j, j]
-        logdet += 2.0 * math.log(S[i, i])
-    for i in range(m):
-        acc = y[i]
-        for k in range(i):
-            acc -= S[i, k] * y[k]
-        y[i] = acc / S[i, i]  # whitened
         nis += y[i] * y[i]
+        logdet += 2.0 * math.log(S[i, i])
     return nis, logdet
+
+
+@njit(**LEAF)
+def learners(tr: Tracks, i: int, s: Settings, sensor: SensorTable) -> int:
+    """Return how many of the states of track `i` may learn from a detection: constant errors not from one sensor alone.
+
+    One sensor cannot show its own; where it seems to, linearisation deceives.
+    """
+    n = tr.x.shape[1]
+    bit = 1 << (sensor.number % 62)
+    return n - s.n_constant if tr.heard[i] | bit == bit else n
+
+
+@njit(**LEAF)
+def condition(
+    x: FloatArray, P: FloatArray, d: int, k: int, look: Look, sensor: SensorTable, room: Workroom, considered: int
+) -> None:
+    """Condition (x, P) at the time of a look on its detection `k`; the first `considered` states learn."""
+    m = components(look.z[k], d, room.mask)
+    linearise(x, d, k, look.dt[k], look, sensor, m, room)
+    innovation(P, look.z[k], look.R[k], m, room, d, sensor.constant[TIME])
+    apply_update(x, P, m, room, considered)
 
 
 @njit(**LEAF)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from boresight.kernels.options import LEAF
-from boresight.kernels.registration import TIME
 from boresight.kernels.tracker import HIDDEN, STATIC, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_place import Places, fix_sensitivity
-from boresight.kernels.tracker_state import apply_update, components, innovation, linearise
+from boresight.kernels.tracker_state import condition, factor, learners, whiten
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
@@ -47,6 +47,39 @@ def merged(tr: Tracks, i: int, s: Settings, sensor: SensorTable, col_of_row: Int
     return -1
 
 
+@njit(cache=True)
+def follow_blob(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, fix: FloatArray, k: int) -> None:
+    """Keep a track that was not detected alone near the detection `k` at `fix` (3,) that may hold it too.
+
+    Along the line of sight and across it, a variance that has grown beyond that of the blob (half its size) comes down
+    to it and never lower: the second look at a blob says nothing that the first did not. Where only bearings placed
+    the track, across is theirs.
+    """
+    d = s.d
+    n = tr.x.shape[1]
+    east, north = fix[0] - look.sensor_position[k, 0], fix[1] - look.sensor_position[k, 1]
+    far = max(math.hypot(east, north), 1e-9)
+    axis = np.zeros(d)
+    for turn in range(1 if tr.heard[i] == 0 else 2):
+        axis[0], axis[1] = (east / far, north / far) if turn == 0 else (north / far, -east / far)
+        Pa = np.zeros(n)
+        for a in range(n):
+            for b in range(d):
+                Pa[a] += tr.P[i, a, b] * axis[b]
+        variance = 0.0
+        off = 0.0
+        for a in range(d):
+            variance += axis[a] * Pa[a]
+            off += axis[a] * (fix[a] - tr.x[i, a])
+        wanted = (0.5 * sensor.resolution) ** 2
+        if variance > wanted:
+            gain = (1.0 - wanted / variance) / variance
+            for a in range(n):
+                tr.x[i, a] += gain * Pa[a] * off
+                for b in range(n):
+                    tr.P[i, a, b] -= gain * Pa[a] * Pa[b]
+
+
 @njit(**LEAF)
 def weigh(tr: Tracks, i: int, log_visible: float, log_static: float, temper: float) -> None:
     """Multiply the weights by the likelihoods of the hypotheses (hidden and nothing: 1) and normalise."""
@@ -78,22 +111,17 @@ def static_likelihood(tr: Tracks, i: int, s: Settings, fix: FloatArray, fix_R: F
     """Log-likelihood of a position fix (world ENU) under "it does not move", on which the anchor is conditioned."""
     d = s.d
     L, W, y = room.L, room.W, room.v
-    nis = 0.0
-    logdet = 0.0
     for a in range(d):
         y[a] = fix[a] - tr.anchor[i, a]
         for b in range(a + 1):
-            acc = tr.anchor_P[i, a, b] + fix_R[a, b]
-            for k in range(b):
-                acc -= L[a, k] * L[b, k]
-            L[a, b] = math.sqrt(max(acc, 1e-300)) if a == b else acc / L[b, b]
-        logdet += math.log(L[a, a])
+            L[a, b] = tr.anchor_P[i, a, b] + fix_R[a, b]
+    factor(L, d)
+    whiten(y, L, d)
+    nis = 0.0
+    logdet = 0.0
     for a in range(d):
-        acc = y[a]
-        for k in range(a):
-            acc -= L[a, k] * y[k]
-        y[a] = acc / L[a, a]
         nis += y[a] * y[a]
+        logdet += math.log(L[a, a])
     for c in range(d):
         for a in range(d):
             acc = tr.anchor_P[i, a, c]
@@ -138,7 +166,6 @@ def moving_likelihood(
                 for a in range(d):
                     G[a, j] = C[a, p]
                     fix[a] -= C[a, p] * x[j]
-    value = d * LOG_2PI
     for a in range(d):
         y[a] = fix[a] - x[a]
         for j in range(2 * d, n - s.n_constant):  # the constant errors are off already
@@ -149,15 +176,13 @@ def moving_likelihood(
                 acc += P[a, j] * G[b, j] + G[a, j] * P[j, b]
                 for m in range(2 * d, n):
                     acc += G[a, j] * P[j, m] * G[b, m]
-            for c in range(b):
-                acc -= L[a, c] * L[b, c]
-            L[a, b] = math.sqrt(max(acc, 1e-300)) if a == b else acc / L[b, b]
+            L[a, b] = acc
+    factor(L, d)
+    whiten(y, L, d)
+    value = d * LOG_2PI
+    for a in range(d):
         value += 2.0 * math.log(L[a, a])
     for a in range(d):
-        acc = y[a]
-        for c in range(a):
-            acc -= L[a, c] * y[c]
-        y[a] = acc / L[a, a]
         value += y[a] * y[a]
     return -0.5 * value
 
@@ -176,22 +201,22 @@ def take(
     temper: float,
 ) -> None:
     """Condition track `i` on detection `k`: state, anchor and hypotheses."""
-    n = tr.x.shape[1]
-    x, P = tr.x[i], tr.P[i]
     log_static = log_visible
     if at.there[k]:
         moving = moving_likelihood(tr, i, s, sensor, look, k, at, room)
         log_static += static_likelihood(tr, i, s, room.fix, at.covariance[k], room) - moving
     if sensor.moves_tracks:
-        c = components(look.z[k], s.d, room.mask)
-        linearise(x, s.d, k, look.dt[k], look, sensor, c, room)
-        innovation(P, look.z[k], look.R[k], c, room, s.d, sensor.constant[TIME])
-        tr.heard[i] |= 1 << (sensor.number % 62)
-        # one sensor alone cannot show its own constant errors; where it seems to, linearisation deceives
-        alone = tr.heard[i] == 1 << (sensor.number % 62)
-        apply_update(x, P, c, room, n - s.n_constant if alone else n)
+        condition(tr.x[i], tr.P[i], s.d, k, look, sensor, room, learners(tr, i, s, sensor))
     weigh(tr, i, log_visible, log_static, temper)
+    note_hit(tr, i, s, sensor, look.t + look.dt[k], sensor.moves_tracks)
+
+
+@njit(**LEAF)
+def note_hit(tr: Tracks, i: int, s: Settings, sensor: SensorTable, t: float, moved: bool) -> None:
+    """Remember that track `i` was detected at time `t` (s), and whether that moved it."""
     if sensor.ranging:
         allow_stop(tr, i, s)
-    tr.life[i, 1] = look.t + look.dt[k]
+    if moved:
+        tr.heard[i] |= 1 << (sensor.number % 62)
+    tr.life[i, 1] = t
     tr.life[i, 3] += 1.0
