@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from boresight.association import jpda
-from boresight.errors import UserError
 from boresight.io.scans import iter_scans
 from boresight.kernels.tracker import Look
 from boresight.kernels.tracker_joint import mix, shares
@@ -132,13 +131,6 @@ def test_shared_detections_keep_the_covariance_honest() -> None:
         nees += [np.mean(t.nees) for t in score(recording, track_rows(rows), None, ["radar"]).targets if t.nees]
     # 16 target runs of about 5 independent values with mean 2: sigma of the mean 2 / sqrt(80) = 0.22; four of these
     assert abs(np.mean(nees) - 2.0) < 0.9
-
-
-def test_an_unknown_association_is_named() -> None:
-    with pytest.raises(UserError, match="did you mean 'nearest'"):
-        TrackerConfig(association="neares")
-    with pytest.raises(UserError, match=r"sensor\['radar'\]"):
-        TrackerConfig(sensors={"radar": SensorErrors(association="gnn")})
 
 
 def test_a_blob_places_no_better_than_its_size() -> None:

@@ -10,8 +10,9 @@ import pytest
 from boresight.io.scans import iter_scans
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.names import MAX_ROW_GAP, Names
+from boresight.tracking.output import Rows
 from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
-from boresight.tracking.tracker import Tracker
+from boresight.tracking.tracker import Output, Tracker, TrackerState
 from boresight.types import FATES, Coverage, DecisionRows, Fate, Recording, Scan, Sensor, SensorKind
 from tests.tracking.test_tracker import CONFIG, same
 
@@ -32,10 +33,10 @@ def test_many_looks_at_a_time_give_what_one_by_one_gives(harbour: Recording, lag
         many, out = tracker.steps(many, scans[first : first + 37])
         past += out.smoothed
     all_at_once = run(tracker, scans)
-    smoothed = []
+    smoothed: list[Rows] = []
 
-    def watch(_: object, out: object) -> None:
-        smoothed.extend(out.smoothed)  # type: ignore[attr-defined]
+    def watch(_: TrackerState, out: Output) -> None:
+        smoothed.extend(out.smoothed)
 
     one_by_one = run(tracker, scans, watch=watch)
     same(track_rows(all_at_once[1]), track_rows(one_by_one[1]))
@@ -52,7 +53,9 @@ def test_many_looks_at_a_time_give_what_one_by_one_gives(harbour: Recording, lag
 
 def test_numbers_are_those_of_a_plain_loop() -> None:
     rng = np.random.default_rng(5)
-    names, last, number, given = Names(), {}, {}, 0  # type: ignore[var-annotated]
+    names, given = Names(), 0
+    last: dict[int, float] = {}
+    number: dict[int, int] = {}
     t = 0.0
     for _ in range(200):
         birth, times, expected = [], [], []

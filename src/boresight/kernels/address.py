@@ -28,7 +28,7 @@ def address_of(function: Any, kind: Any) -> int:
 
 def _at(kind: Any) -> Any:
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        function = cgutils.create_struct_proxy(kind)(context, builder)  # type: ignore[no-untyped-call]
+        function = cgutils.create_struct_proxy(kind)(context, builder)
         pointer = ir.IntType(8).as_pointer()
         function.c_addr = function.py_addr = ir.Constant(pointer, None)
         function.jit_addr = builder.inttoptr(arguments[0], pointer)

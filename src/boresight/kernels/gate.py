@@ -125,7 +125,7 @@ def gate_grid(
 
 
 @njit(
-    types.Tuple((types.int64, types.float64))(  # type: ignore[no-untyped-call]
+    types.Tuple((types.int64, types.float64))(
         MATRIX, STACK, MATRIX, types.float64, types.float64, INTS, INTS, VECTOR, VECTOR, INTS, VECTOR
     ),
     cache=True,

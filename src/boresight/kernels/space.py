@@ -101,7 +101,7 @@ def slopes(p: Three, v: Three, z: FloatArray, c: FloatArray, H: FloatArray) -> i
     return m
 
 
-USED = types.Tuple((types.int64, types.float64, types.float64))  # type: ignore[no-untyped-call]
+USED = types.Tuple((types.int64, types.float64, types.float64))
 
 
 @njit(USED(THING, THING, THING, THING, THING, THING, THING, THING), **FAST)

@@ -197,7 +197,7 @@ def learners(tr: Tracks, i: int, s: Settings, sensor: SensorTable) -> int:
 
     One sensor cannot show its own; where it seems to, linearisation deceives.
     """
-    n = tr.x.shape[1]
+    n: int = tr.x.shape[1]
     bit = 1 << (sensor.number % 62)
     return n - s.n_constant if tr.heard[i] | bit == bit else n
 

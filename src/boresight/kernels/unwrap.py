@@ -44,9 +44,9 @@ THING = Thing()
 register_model(Thing)(models.OpaqueModel)
 
 
-@unbox(Thing)  # type: ignore[no-untyped-call]
+@unbox(Thing)
 def _borrow(kind: Any, thing: Any, c: Any) -> Any:
-    return NativeValue(thing)  # type: ignore[no-untyped-call]
+    return NativeValue(thing)
 
 
 def _field(builder: Any, thing: Any, at: int, kind: Any) -> Any:
@@ -83,15 +83,15 @@ def _view(dimensions: int) -> Any:
 
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         thing = arguments[0]
-        out = cgutils.alloca_once_value(builder, ir.Constant(context.get_value_type(array), None))  # type: ignore[no-untyped-call]
+        out = cgutils.alloca_once_value(builder, ir.Constant(context.get_value_type(array), None))
         with builder.if_then(_is_array(builder, thing)), builder.if_then(_is_usable(builder, thing, dimensions)):
-            made = make_array(array)(context, builder)  # type: ignore[no-untyped-call]
+            made = make_array(array)(context, builder)
             shape, strides = (
                 [_field(builder, _field(builder, thing, at, POINTER), 8 * i, LONG) for i in range(dimensions)]
                 for at in (SHAPE, STRIDES)
             )
             data, size = _field(builder, thing, DATA, DOUBLE.as_pointer()), ir.Constant(LONG, 8)
-            populate_array(made, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None)  # type: ignore[no-untyped-call]
+            populate_array(made, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None)
             builder.store(made._getvalue(), out)
         return builder.load(out)
 

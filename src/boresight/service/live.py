@@ -49,10 +49,7 @@ def run_live(
     out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM) if file.output.udp else None
     goal = address(file.output.udp, "output.udp") if file.output.udp else ("", 0)
     stream = Broadcast(file.output.tcp) if file.output.tcp else None
-    rotator = None
-    if file.output.rotctld:
-        band, period = math.radians(file.output.dead_band_deg), 1.0 / file.output.command_rate_hz
-        rotator = Rotator(file.output.rotctld, station.mount, band, period)
+    rotator = _rotator(station)
     # half a turn: more is never to be made good
     ahead = np.arange(0.0, min(math.pi / station.mount.azimuth_rate, FURTHEST) + SPACING, SPACING)
     elements = Elements(pointer, station.elements)
@@ -112,6 +109,13 @@ def run_live(
         **feed.counts,
     }
     return found | ({f"rotator_{k}": v for k, v in rotator.counts.items()} if rotator else {})
+
+
+def _rotator(station: Station) -> Rotator | None:
+    out = station.file.output
+    if not out.rotctld:
+        return None
+    return Rotator(out.rotctld, station.mount, math.radians(out.dead_band_deg), 1.0 / out.command_rate_hz)
 
 
 def steady(carrier: Navigation | None, p: Pointing) -> bool:

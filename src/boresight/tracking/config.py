@@ -75,6 +75,9 @@ class TrackerConfig:
         for name in ("survival_time", "hide_time", "show_time", "clutter_memory"):
             if not getattr(self, name) > 0.0:
                 raise UserError(f"tracker: {name} must be positive")
+        for name in ("static_share", "stop_floor", "doubt", "delete_below", "blob_share"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise UserError(f"tracker: {name} must lie in [0, 1]")
         if not 0.5 <= self.gate_probability < 1.0:
             raise UserError("tracker: gate_probability must lie in [0.5, 1)")
         if not 0.0 <= self.hide_below <= self.confirm_above <= 1.0:

@@ -10,11 +10,11 @@ import numpy as np
 from scipy.stats import chi2
 
 from boresight.kernels.registration import AZIMUTH, ELEVATION, N_PARAMETERS, RANGE, SCALE, TIME
-from boresight.kernels.tracker import AZIMUTH_BINS, Extras, SensorTable, Settings, Tracks
+from boresight.kernels.tracker import AZIMUTH_BINS, Extras, IntArray, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_copies import EACH, WHOLE, Copies, no_copies
 from boresight.kernels.tracker_looks import columns_of
 from boresight.tracking.config import SensorErrors, TrackerConfig
-from boresight.types import N_COMPONENTS, Component, Sensor, SensorKind
+from boresight.types import N_COMPONENTS, Component, FloatArray, Sensor, SensorKind
 
 _BIASED = {
     Component.RANGE: "bias_range",
@@ -51,54 +51,71 @@ def make_plan(
     for index, sensor in enumerate(sensors):
         errors = config.sensors.get(sensor.id, SensorErrors())
         bias = np.full(N_COMPONENTS, -1, np.int64)
-        for component, key in _BIASED.items():
-            if flat and component in (Component.ELEVATION, Component.UP):
-                continue
-            value = getattr(errors, key)
-            wanted = used is None or index in used
-            if wanted and value > 0.0 and math.isfinite(sensor.sigma[component]):
+        if used is None or index in used:
+            for component, value in _biases(sensor, errors, flat):
                 bias[component] = 2 * d + len(sigma)
                 sigma.append(value)
                 tau.append(errors.bias_time)
-        if used is None or index in used:
             known += [(v, (index, p)) for p, v in _constants(sensor, errors, flat)]
-        c = sensor.coverage
-        span = c.azimuth[1] - c.azimuth[0]
-        if span <= 0.0:
-            span += 2.0 * math.pi
-        tables.append(
-            SensorTable(
-                number=index,
-                p_detection=min(sensor.p_detection, 0.999),
-                clutter_per_scan=sensor.clutter_per_scan,
-                range_low=c.range[0],
-                range_high=c.range[1],
-                azimuth_low=c.azimuth[0],
-                azimuth_span=min(span, 2.0 * math.pi),
-                elevation_low=c.elevation[0],
-                elevation_high=c.elevation[1],
-                ranging=sensor.kind not in (SensorKind.INFRARED, SensorKind.OPTICAL),
-                bias=bias,
-                registers=False,
-                constant=constants[index],
-                decorrelation=errors.decorrelation,
-                fade_range=errors.fade_range,
-                resolution=errors.resolution,
-                report_range=errors.report_range,
-                moves_tracks=errors.moves_tracks,
-                joint=(errors.association or config.association) == "jpda",
-            )
-        )
+        joint = (errors.association or config.association) == "jpda"
+        tables.append(_table(index, sensor, errors, bias, constants[index], joint))
     sigma += [value for value, _ in known]
     tau += [math.inf] * len(known)
     for place, (_, (index, parameter)) in enumerate(known):
         constants[index][parameter] = 2 * d + len(sigma) - len(known) + place
     tables = [t._replace(registers=bool((t.constant >= 0).any())) for t in tables]
-    gates = np.array([0.0, *chi2.ppf(config.gate_probability, np.arange(1, 8))])
-    settings = Settings(
+    ranging = [t for t in tables if t.ranging and (used is None or t.number in used)]
+    settings = _settings(config, d, np.array(sigma), np.array(tau), len(known), ranging)
+    n = 2 * d + len(sigma)
+    extras = bool(known or config.blob_share > 0.0 or any(t.joint for t in tables)) or None
+    return Plan(settings, tuple(tables), n, columns_of(tuple(tables)), _before_all(settings, tables, n), extras)
+
+
+def _table(
+    number: int, sensor: Sensor, errors: SensorErrors, bias: IntArray, constant: IntArray, joint: bool
+) -> SensorTable:
+    """Pack one sensor; `registers` is set once its constant errors have their states."""
+    c = sensor.coverage
+    span = c.azimuth[1] - c.azimuth[0]
+    if span <= 0.0:
+        span += 2.0 * math.pi
+    return SensorTable(
+        number=number,
+        p_detection=min(sensor.p_detection, 0.999),
+        clutter_per_scan=sensor.clutter_per_scan,
+        range_low=c.range[0],
+        range_high=c.range[1],
+        azimuth_low=c.azimuth[0],
+        azimuth_span=min(span, 2.0 * math.pi),
+        elevation_low=c.elevation[0],
+        elevation_high=c.elevation[1],
+        ranging=sensor.kind not in (SensorKind.INFRARED, SensorKind.OPTICAL),
+        bias=bias,
+        registers=False,
+        constant=constant,
+        decorrelation=errors.decorrelation,
+        fade_range=errors.fade_range,
+        resolution=errors.resolution,
+        report_range=errors.report_range,
+        moves_tracks=errors.moves_tracks,
+        joint=joint,
+    )
+
+
+def _settings(
+    config: TrackerConfig,
+    d: int,
+    bias_sigma: FloatArray,
+    bias_tau: FloatArray,
+    n_constant: int,
+    ranging: Sequence[SensorTable],
+) -> Settings:
+    """Pack the settings; `ranging` are the ranging sensors in use."""
+    flat = d == 2
+    return Settings(
         d=d,
         q=config.q if config.q is not None else (0.1 if flat else 1.0),
-        gates=gates,
+        gates=np.array([0.0, *chi2.ppf(config.gate_probability, np.arange(1, 8))]),
         speed_sigma=config.speed_sigma if config.speed_sigma is not None else (8.0 if flat else 150.0),
         birth_rate=config.birth_rate,
         survival_time=config.survival_time,
@@ -112,22 +129,28 @@ def make_plan(
         delete_below=config.delete_below,
         show_above=config.confirm_above,
         hide_below=config.hide_below,
-        bias_sigma=np.array(sigma),
-        bias_tau=np.array(tau),
-        n_constant=len(known),
-        farthest_report=max(
-            [t.report_range for t in tables if t.ranging and (used is None or t.number in used)] or [0.0]
-        ),
+        bias_sigma=bias_sigma,
+        bias_tau=bias_tau,
+        n_constant=n_constant,
+        farthest_report=max([t.report_range for t in ranging], default=0.0),
         merge_distance=config.merge_distance if config.merge_distance is not None else (10.0 if flat else 30.0),
         apart=config.apart,
         lonely_bearings=config.lonely_bearings,
         clutter_memory=config.clutter_memory,
-        blob=max([t.resolution for t in tables if t.ranging and (used is None or t.number in used)] or [0.0]),
+        blob=max([t.resolution for t in ranging], default=0.0),
         blob_share=config.blob_share,
     )
-    n = 2 * d + len(sigma)
-    extras = bool(known or config.blob_share > 0.0 or any(t.joint for t in tables)) or None
-    return Plan(settings, tuple(tables), n, columns_of(tuple(tables)), _before_all(settings, tables, n), extras)
+
+
+def _biases(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[Component, float]]:
+    """Return (component, sigma) of the wandering biases that are declared and of which the sensor measures anything."""
+    return [
+        (component, value)
+        for component, key in _BIASED.items()
+        if not (flat and component in (Component.ELEVATION, Component.UP))
+        and (value := getattr(errors, key)) > 0.0
+        and math.isfinite(sensor.sigma[component])
+    ]
 
 
 def _constants(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[int, float]]:

@@ -1,0 +1,33 @@
+"""Settings outside their range are named."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from boresight.errors import UserError
+from boresight.tracking.config import SensorErrors, TrackerConfig
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"survival_time": 0.0},
+        {"clutter_memory": float("nan")},
+        {"gate_probability": 1.0},
+        {"confirm_above": 0.3, "hide_below": 0.4},
+        {"blob_share": 1.5},
+        {"static_share": -0.1},
+    ],
+)
+def test_a_value_out_of_range_is_named(values: dict[str, Any]) -> None:
+    with pytest.raises(UserError, match=f"tracker: .*{next(iter(values))}"):
+        TrackerConfig(**values)
+
+
+def test_an_unknown_association_is_named() -> None:
+    with pytest.raises(UserError, match="did you mean 'nearest'"):
+        TrackerConfig(association="neares")
+    with pytest.raises(UserError, match=r"sensor\['radar'\]"):
+        TrackerConfig(sensors={"radar": SensorErrors(association="gnn")})
