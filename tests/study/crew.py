@@ -31,3 +31,8 @@ def die_always(task: int) -> dict[str, Any]:
 def fail(task: int) -> dict[str, Any]:
     """Raise."""
     raise ValueError(f"no {task}")
+
+
+def interrupted(task: int) -> dict[str, Any]:
+    """Say what Ctrl-C would do here."""
+    return {"ignored": signal.getsignal(signal.SIGINT) == signal.SIG_IGN}

@@ -154,6 +154,13 @@ def test_a_worker_that_dies_is_retried_and_reported(tmp_path: Path) -> None:
         list(run_all("local", crew.fail, [7], 1, told.append))
 
 
+def test_ctrl_c_is_for_the_parent_alone() -> None:
+    """Else every worker that is still importing prints where it was."""
+    before = signal.getsignal(signal.SIGINT)
+    assert dict(run_all("local", crew.interrupted, [0], 1, print)) == {0: {"ignored": True}}
+    assert signal.getsignal(signal.SIGINT) is before
+
+
 def table(folder: Path) -> tuple[Any, Any]:
     return pq.read_table(folder / "runs.parquet"), pq.read_table(folder / "cells.parquet")
 

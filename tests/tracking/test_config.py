@@ -19,11 +19,22 @@ from boresight.tracking.config import SensorErrors, TrackerConfig
         {"confirm_above": 0.3, "hide_below": 0.4},
         {"blob_share": 1.5},
         {"static_share": -0.1},
+        {"speed_sigma": 0.0},
+        {"q": -1.0},
+        {"clutter_memory": 0.5},
     ],
 )
 def test_a_value_out_of_range_is_named(values: dict[str, Any]) -> None:
     with pytest.raises(UserError, match=f"tracker: .*{next(iter(values))}"):
         TrackerConfig(**values)
+
+
+@pytest.mark.parametrize(
+    "values", [{"bias_time": 0.0}, {"fade_range": 0.0}, {"bias_range": float("inf")}, {"decorrelation": float("nan")}]
+)
+def test_of_a_sensor_too(values: dict[str, float]) -> None:
+    with pytest.raises(UserError, match=rf"sensor\['ir'\]: {next(iter(values))}"):
+        TrackerConfig(sensors={"ir": SensorErrors(**values)})
 
 
 def test_an_unknown_association_is_named() -> None:

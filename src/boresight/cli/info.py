@@ -54,7 +54,7 @@ def info(rec: Path, /, *, json: bool = False) -> None:
         return
     about = _about(recording)
     print(
-        f"{about['name'] or rec.name}: {about['dimensions']}-D, {about['duration_s']:.1f} s, {about['rows']} rows\n"
+        f"{about['name']}: {about['dimensions']}-D, {about['duration_s']:.1f} s, {about['rows']} rows\n"
         f"site {about['latitude_deg']:.6f}°, {about['longitude_deg']:.6f}°, {about['height_m']:.1f} m; "
         f"first stamp {about['start_s']:.3f} s\n"
         f"rows stamped before an earlier row: {about['out_of_order']}, by up to {about['longest_step_back_s']:.3g} s"

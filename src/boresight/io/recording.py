@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from boresight.types import Axes, Detections, PlatformTrack, Recording, Sensor
 
 
 def read_recording(path: Path | str) -> Recording:
-    """Read and check a recording folder: SI, radians, the site's east/north/up.
+    """Read and check a recording folder: SI, radians, the site's east/north/up; without a name it goes by its folder's.
 
     Raises UserError with one line that names file, row or key, and what to do.
     """
@@ -26,6 +27,7 @@ def read_recording(path: Path | str) -> Recording:
         what = "is a file, not a recording folder" if folder.exists() else "no such recording folder"
         raise UserError(f"{folder}: {what}")
     declared = read_declaration(folder / "recording.toml")
+    declared = replace(declared, name=declared.name or folder.resolve().name)
     detections = read_table(folder / "detections.parquet", det.SCHEMA, det.REQUIRED)
     tables = {}
     for name, schema, key in (

@@ -8,8 +8,11 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import os
+import signal
+import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
@@ -48,8 +51,21 @@ def _serve(work: Work, pipe: Connection) -> None:
                 pipe.send((i, work(task), None))
             except Exception as error:
                 pipe.send((i, None, f"{type(error).__name__}: {error}"))
-        except (EOFError, OSError, KeyboardInterrupt):
+        except (EOFError, OSError):
             return
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Ignore Ctrl-C, and let processes begun here ignore it for good: this process hears it and ends them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _local(work: Work, tasks: Sequence[Any], workers: int, tell: Tell) -> Iterator[tuple[int, dict[str, Any]]]:
@@ -60,7 +76,8 @@ def _local(work: Work, tasks: Sequence[Any], workers: int, tell: Tell) -> Iterat
     def hire() -> None:
         ours, theirs = context.Pipe()
         process = context.Process(target=_serve, args=(work, theirs), daemon=True)
-        process.start()
+        with _deaf():
+            process.start()
         theirs.close()
         give(ours, process)
 

@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from boresight.errors import UserError, did_you_mean
 
 ASSOCIATIONS = ("nearest", "jpda")
+# what values may be; None is left out
+POSITIVE = ("survival_time", "hide_time", "show_time", "speed_sigma")
+SHARES = ("static_share", "stop_floor", "doubt", "delete_below", "blob_share")
+NOT_NEGATIVE = (
+    "q", "birth_rate", "static_q", "targets_at_start", "apart", "merge_distance", "coast_after", "smoothing_lag",
+    "window",
+)  # fmt: skip
+SPREADS = (  # of a sensor
+    "bias_range", "bias_azimuth", "bias_elevation", "bias_position", "offset_time", "offset_range", "offset_scale",
+    "offset_azimuth", "offset_elevation", "decorrelation", "resolution",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,20 +85,28 @@ class TrackerConfig:
     sensors: dict[str, SensorErrors] = field(default_factory=dict)  # by sensor id
 
     def __post_init__(self) -> None:
-        for name in ("survival_time", "hide_time", "show_time", "clutter_memory"):
-            if not getattr(self, name) > 0.0:
-                raise UserError(f"tracker: {name} must be positive")
-        for name in ("static_share", "stop_floor", "doubt", "delete_below", "blob_share"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise UserError(f"tracker: {name} must lie in [0, 1]")
+        _check(self, "tracker", POSITIVE, lambda v: v > 0.0, "must be positive")
+        _check(self, "tracker", SHARES, lambda v: 0.0 <= v <= 1.0, "must lie in [0, 1]")
+        _check(self, "tracker", NOT_NEGATIVE, lambda v: v >= 0.0, "must not be negative")
+        _check(self, "tracker", ("clutter_memory",), lambda v: v >= 1.0, "must be 1 or more")
         if not 0.5 <= self.gate_probability < 1.0:
             raise UserError("tracker: gate_probability must lie in [0.5, 1)")
         if not 0.0 <= self.hide_below <= self.confirm_above <= 1.0:
             raise UserError("tracker: need 0 <= hide_below <= confirm_above <= 1")
         _check_association(self.association, "tracker")
         for sensor, errors in self.sensors.items():
+            where = f"sensor['{sensor}']"
+            _check(errors, where, ("bias_time", "fade_range"), lambda v: v > 0.0, "must be positive")
+            _check(errors, where, SPREADS, lambda v: 0.0 <= v < math.inf, "must be finite and not negative")
             if errors.association is not None:
-                _check_association(errors.association, f"sensor['{sensor}']")
+                _check_association(errors.association, where)
+
+
+def _check(item: object, where: str, names: Sequence[str], fits: Callable[[float], bool], rule: str) -> None:
+    for name in names:
+        value = getattr(item, name)
+        if value is not None and not fits(value):
+            raise UserError(f"{where}: {name} {rule}, not {value:g}")
 
 
 def _check_association(word: str, where: str) -> None:
