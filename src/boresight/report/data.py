@@ -176,8 +176,9 @@ def _looks(recording: Recording, rows: list[dict[str, Any]], first: float, last:
     """Rows per even bin of time for each sensor: shows rates and gaps. A bin holds two looks of the slowest sensor."""
     d = recording.detections
     slowest = max([row["median_period_s"] or 0.0 for row in rows if row["item"] == "sensor"], default=0.0)
+    first, last = first - 0.5 * slowest, max(last, first) + 0.5 * slowest + 1e-9  # no look on an edge
     bins = int(np.clip((last - first) / max(2.0 * slowest, 1e-9), 20, 120))
-    edges = np.linspace(first, max(last, first + 1e-9), bins + 1)
+    edges = np.linspace(first, last, bins + 1)
     return [
         {"id": s.id, "n": np.histogram(d.t[d.sensor == i], edges)[0].tolist()} for i, s in enumerate(recording.sensors)
     ]
