@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from numba import njit
 
-from boresight.kernels.options import BARE
+from boresight.kernels.options import BARE, KERNEL
 from boresight.kernels.tracker import Extras, IntArray, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_copies import Copies, keep, restore
 from boresight.kernels.tracker_looks import NO_SENSOR, Looks, look_at, sensor_at
@@ -50,7 +50,7 @@ class Queue(NamedTuple):
     wanted: IntArray  # (4,) room for tracks, copies, tracks in copies, and rows, where `advance` stopped for want of it
 
 
-@njit(**BARE)
+@njit(**KERNEL)
 def advance(
     tr: Tracks,
     copies: Copies,

@@ -1,0 +1,99 @@
+"""Compile a kernel's parts only as far as the kernel needs them.
+
+Numba makes of every compiled function, also of one that only other compiled functions call, a library of its own: a
+wrapper for calls from Python, optimised in full, turned into machine code; and then puts the same code into each caller
+and does all of that again, once for every level of calls. `PartCompiler` (a `pipeline_class` of `numba.njit`) leaves to
+the kernel what only the kernel needs: a part has no wrapper, is simplified but not optimised, and becomes machine code
+as part of its callers only. A part called from Python raises TypeError.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import _dynfunc
+from numba.core import cgutils
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.typed_passes import NativeLowering
+
+
+class PartLibrary(JITCodeLibrary):
+    """Code to be put into others: never optimised in full, never machine code, cached as bitcode."""
+
+    def _optimize_final_module(self) -> None:
+        manager, builder = self._codegen._module_pass_manager(
+            loop_vectorize=self._codegen._loopvect, slp_vectorize=False, opt=self._codegen._opt_level, cost="cheap"
+        )
+        manager.run(self._final_module, builder)
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    def serialize_using_object_code(self) -> Any:
+        return self.serialize_using_bitcode()
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class PartLowering(NativeLowering):
+    """Numba's last pass, for a part."""
+
+    _name = "part_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        context, flags = state.targetctx, state.flags
+        state.library = library = PartLibrary(context.codegen(), state.func_id.func_qualname)
+        library.enable_object_caching()
+        flags.no_cpython_wrapper = flags.no_cfunc_wrapper = flags.no_compile = True
+        super().run_pass(state)
+        made, name = state["cr"], state.func_id.func_name
+        _refuse_python(context, library, made.fndesc.llvm_cpython_wrapper_name, name)
+        refusal = _refusal(context)
+        entry = _dynfunc.make_function(
+            made.fndesc.lookup_module(), name, "part of a kernel", refusal, made.env, (library,)
+        )
+        context.insert_user_function(entry, made.fndesc, [library])
+        state["cr"] = made._replace(cfunc=entry)
+        return True
+
+
+class PartCompiler(CompilerBase):
+    """Numba's compiler with `PartLowering` in the place of its last pass."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the one pipeline."""
+        pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        pipeline.passes = [
+            (PartLowering, text) if kind is NativeLowering else (kind, text) for kind, text in pipeline.passes
+        ]
+        pipeline.finalize()
+        return [pipeline]
+
+
+def _refuse_python(context: Any, library: Any, wrapper: str, name: str) -> None:
+    """Give a library a wrapper for Python that does nothing but raise TypeError."""
+    module = context.create_module("refusal")
+    obj = ir.IntType(8).as_pointer()
+    function = ir.Function(module, ir.FunctionType(obj, [obj, obj, obj]), wrapper)
+    builder = ir.IRBuilder(function.append_basic_block())
+    text = f"{name} is part of a kernel and cannot be called from Python"
+    context.get_python_api(builder).err_set_string("PyExc_TypeError", text)
+    builder.ret(cgutils.get_null_value(obj))
+    library.add_ir_module(module)
+
+
+_refusals: dict[Any, tuple[Any, int]] = {}
+
+
+def _refusal(context: Any) -> int:
+    """Return the address of one such wrapper, for the parts of this process, which have no machine code."""
+    codegen = context.codegen()
+    if codegen not in _refusals:
+        library = codegen.create_library("refusal")
+        _refuse_python(context, library, "boresight_part", "this")
+        _refusals[codegen] = library, library.get_pointer_to_function("boresight_part")
+    return _refusals[codegen][1]
