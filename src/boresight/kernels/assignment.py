@@ -6,12 +6,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
 IntArray = NDArray[np.int64]
 
 
-@njit(cache=True)
+@njit(**PART)
 def _sift_up(heap_d: FloatArray, heap_c: IntArray, size: int, d: float, c: int) -> None:
     i = size
     while i > 0:
@@ -25,7 +26,7 @@ def _sift_up(heap_d: FloatArray, heap_c: IntArray, size: int, d: float, c: int) 
     heap_c[i] = c
 
 
-@njit(cache=True)
+@njit(**PART)
 def _pop(heap_d: FloatArray, heap_c: IntArray, size: int) -> None:
     """Remove the top of a heap of `size` entries (the caller has read it)."""
     d = heap_d[size - 1]
@@ -122,7 +123,7 @@ def assign_sparse(start: IntArray, column: IntArray, cost: FloatArray, n_columns
         _augment(first, end, alone, came_from, col_of_row, row_of_col)
 
 
-@njit(cache=True)
+@njit(**PART)
 def _dual(row: int, held: int, start: IntArray, column: IntArray, cost: FloatArray, price: FloatArray) -> float:
     """Return a row's dual: the reduced cost of the column it holds, zero where it is alone."""
     for e in range(start[row], start[row + 1]):
@@ -131,7 +132,7 @@ def _dual(row: int, held: int, start: IntArray, column: IntArray, cost: FloatArr
     return 0.0
 
 
-@njit(cache=True)
+@njit(**PART)
 def _augment(first: int, end: int, alone: int, came_from: IntArray, col_of_row: IntArray, row_of_col: IntArray) -> None:
     """Move the assignment along the path back from the free column `end`, or from the row that stays `alone`."""
     c = end

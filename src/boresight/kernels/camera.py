@@ -12,13 +12,14 @@ import numpy as np
 from numba import njit
 
 from boresight.kernels.geodesy import Arrays
+from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
 ITERATIONS = 50
 Pair = tuple[float, float]
 
 
-@njit(cache=True)
+@njit(**PART)
 def distort(c: FloatArray, x: float, y: float) -> Pair:
     """Return the distorted normalised coordinates of (x, y)."""
     s = x * x + y * y
@@ -29,7 +30,7 @@ def distort(c: FloatArray, x: float, y: float) -> Pair:
     )
 
 
-@njit(cache=True)
+@njit(**PART)
 def distort_jacobian(c: FloatArray, x: float, y: float) -> tuple[float, float, float]:
     """Return the entries (xx, xy, yy) of the symmetric Jacobian of `distort`."""
     s = x * x + y * y
@@ -42,7 +43,7 @@ def distort_jacobian(c: FloatArray, x: float, y: float) -> tuple[float, float, f
     )
 
 
-@njit(cache=True)
+@njit(**PART)
 def undistort(c: FloatArray, xd: float, yd: float) -> Pair:
     """Return (x, y) with `distort` = (xd, yd) by damped Newton steps inside the fold; NaN if there is none."""
     x, y = xd, yd
@@ -73,7 +74,7 @@ def undistort(c: FloatArray, xd: float, yd: float) -> Pair:
     return math.nan, math.nan
 
 
-@njit(cache=True)
+@njit(**PART)
 def pixel_from_direction(
     c: FloatArray, forward: FloatArray, right: FloatArray, down: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -90,7 +91,7 @@ def pixel_from_direction(
     return px, py
 
 
-@njit(cache=True)
+@njit(**PART)
 def direction_from_pixel(c: FloatArray, px: FloatArray, py: FloatArray) -> Arrays:
     """Return unit directions forward, right, down (n,) of pixels; NaN where no ray is distorted to the pixel."""
     n = len(px)
@@ -102,7 +103,7 @@ def direction_from_pixel(c: FloatArray, px: FloatArray, py: FloatArray) -> Array
     return forward, right, down
 
 
-@njit(cache=True)
+@njit(**PART)
 def pixel_from_direction_jacobian(
     c: FloatArray, forward: FloatArray, right: FloatArray, down: FloatArray
 ) -> FloatArray:
@@ -117,7 +118,7 @@ def pixel_from_direction_jacobian(
     return J
 
 
-@njit(cache=True)
+@njit(**PART)
 def direction_from_pixel_jacobian(c: FloatArray, px: FloatArray, py: FloatArray) -> FloatArray:
     """Return d(forward, right, down)/d(pixel), (n, 3, 2), of unit directions."""
     J = np.empty((len(px), 3, 2))

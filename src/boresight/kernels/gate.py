@@ -6,11 +6,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, types
+from numba import njit
 
 from boresight.kernels.assignment import assign_sparse
 from boresight.kernels.gaussian import cholesky
 from boresight.kernels.observation import IntArray
+from boresight.kernels.options import PART, types
 from boresight.kernels.signatures import MATRIX, STACK, VECTOR
 from boresight.types.sensor import FloatArray
 
@@ -18,7 +19,7 @@ INTS = types.int64[::1]
 NOT_FINITE = -(2**62)  # what `gate_grid` returns where a prediction or detection is NaN or infinite
 
 
-@njit(cache=True)
+@njit(**PART)
 def cells(z: FloatArray, size: float, low: FloatArray, shape: IntArray) -> tuple[IntArray, IntArray]:
     """Sort detections `z` (m, d) into square cells of `size` over their first two components.
 
@@ -39,13 +40,13 @@ def cells(z: FloatArray, size: float, low: FloatArray, shape: IntArray) -> tuple
     return begin, order
 
 
-@njit(cache=True)
+@njit(**PART)
 def place(at: float, low: float, size: float, cells: int) -> int:
     """Return the cell of a coordinate, that of the border for one beyond it."""
     return int(max(0.0, min((at - low) / size, cells - 1.0)))
 
 
-@njit(cache=True)
+@njit(**PART)
 def distance2(x: FloatArray, L: FloatArray, z: FloatArray, w: FloatArray) -> float:
     """Return |L⁻¹(z - x)|²; `w` (d,) is scratch."""
     total = 0.0

@@ -7,10 +7,11 @@ import math
 import numpy as np
 from numba import njit
 
+from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
 
-@njit(cache=True)
+@njit(**PART)
 def cholesky(A: FloatArray, L: FloatArray) -> bool:
     """Fill `L` with the lower Cholesky factor of symmetric `A` (n, n); False where it is not positive definite."""
     n = A.shape[0]
@@ -32,7 +33,7 @@ def cholesky(A: FloatArray, L: FloatArray) -> bool:
     return True
 
 
-@njit(cache=True)
+@njit(**PART)
 def solve_lower(L: FloatArray, b: FloatArray) -> None:
     """Overwrite `b` (n,) with L⁻¹b."""
     for i in range(L.shape[0]):
@@ -42,7 +43,7 @@ def solve_lower(L: FloatArray, b: FloatArray) -> None:
         b[i] = s / L[i, i]
 
 
-@njit(cache=True)
+@njit(**PART)
 def solve_upper(L: FloatArray, b: FloatArray) -> None:
     """Overwrite `b` (n,) with L⁻ᵀb."""
     n = L.shape[0]
@@ -75,7 +76,7 @@ def sandwich(A: FloatArray, P: FloatArray, Q: FloatArray) -> FloatArray:
     return out
 
 
-@njit(cache=True)
+@njit(**PART)
 def _joseph(A: FloatArray, P: FloatArray, K: FloatArray, R: FloatArray) -> FloatArray:
     """Return A P Aᵀ + K R Kᵀ, exactly symmetric."""
     n, m = K.shape

@@ -11,6 +11,7 @@ import math
 
 from numba import njit
 
+from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
 MU = 3.986004418e14  # m³/s²
@@ -91,7 +92,7 @@ def advance(x: FloatArray, dynamics: int, dt: float, w: FloatArray) -> None:
     fly(x, dt)
 
 
-@njit(cache=True)
+@njit(**PART)
 def noise(dynamics: int, q: float, dt: float, i: int, j: int) -> float:
     """Return the process noise between derivatives i and j of one axis over `dt` (s, positive)."""
     if dynamics == ORBIT:  # white acceleration (m²/s³)
@@ -165,7 +166,7 @@ def motion_axes(x: FloatArray, w: FloatArray) -> None:
     w[B, 2], w[B + 1, 2], w[B + 2, 2] = u0, u1, u2
 
 
-@njit(cache=True)
+@njit(**PART)
 def spin(t: float, a: FloatArray, out: FloatArray) -> None:
     """Turn ECEF (3,) at time `t` to the inertial frame."""
     c, s = math.cos(EARTH_RATE * t), math.sin(EARTH_RATE * t)

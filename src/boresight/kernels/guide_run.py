@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from boresight.kernels.guide import ACCELERATION, EARTH_RATE, ORBIT, TRACK, WORK, advance, look_at, spin
 from boresight.kernels.guide_update import CLIP, bring_to, report_position, start, update
+from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
 # Where a filter's settings and running numbers stand in their arrays.
@@ -24,7 +25,7 @@ WAKE = 4.0  # rejections of one source in a row that wake the hypothesis that it
 ACCEPTED, REJECTED, WAITING, STALE = 0, 1, 2, 3
 
 
-@njit(cache=True)
+@njit(**PART)
 def step(
     clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, scale: FloatArray, run_of: FloatArray,
     settings: FloatArray, spread: FloatArray, source: int, kind: int, t: float, z: FloatArray, origin: FloatArray,
@@ -75,7 +76,7 @@ def step(
     return fate
 
 
-@njit(cache=True)
+@njit(**PART)
 def _begin(
     clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, dynamics: int, sigma_bias: FloatArray,
     spread: FloatArray, kind: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray,
@@ -95,7 +96,7 @@ def _begin(
     return True
 
 
-@njit(cache=True)
+@njit(**PART)
 def _bring_all(
     clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, dynamics: int, q: float, t: float, w: FloatArray,
 ) -> None:  # fmt: skip
@@ -109,7 +110,7 @@ def _bring_all(
     clock[C_COUNT] += 1.0
 
 
-@njit(cache=True)
+@njit(**PART)
 def _wake(X: FloatArray, P: FloatArray, L: FloatArray, best: int, source: int, sigma_bias: float) -> None:
     """Start the hypothesis that `source` is biased from the best one, with the bias unknown."""
     h, m = source + 1, X.shape[1] - 3
@@ -122,7 +123,7 @@ def _wake(X: FloatArray, P: FloatArray, L: FloatArray, best: int, source: int, s
     L[h] = 0.5 * ASLEEP
 
 
-@njit(cache=True)
+@njit(**PART)
 def _weigh(clock: FloatArray, L: FloatArray) -> None:
     """Count the log-likelihoods from the best one's, and lay to rest what is far behind."""
     best = 0
@@ -138,7 +139,7 @@ def _weigh(clock: FloatArray, L: FloatArray) -> None:
     clock[C_BEST] = best
 
 
-@njit(cache=True)
+@njit(**PART)
 def predict_to(
     clock: FloatArray, X: FloatArray, P: FloatArray, settings: FloatArray, t: float, position: FloatArray,
     velocity: FloatArray, covariance: FloatArray, w: FloatArray,
@@ -175,7 +176,7 @@ def predict_to(
     return True
 
 
-@njit(cache=True)
+@njit(**PART)
 def run(
     clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, scale: FloatArray, run_of: FloatArray,
     settings: FloatArray, spread: FloatArray, source: NDArray[np.int64], kind: NDArray[np.int64], t: FloatArray,

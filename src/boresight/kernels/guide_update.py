@@ -25,6 +25,7 @@ from boresight.kernels.guide import (
     noise,
     predict,
 )  # fmt: skip
+from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
 LOG_TURN = math.log(2.0 * math.pi)
@@ -157,7 +158,7 @@ def _late(dynamics: int, q: float, lag: float, k: int, w: FloatArray) -> None:
             w[S + 3 + i, 3 + i] += vv
 
 
-@njit(cache=True)
+@njit(**PART)
 def bring_to(
     x: FloatArray, P: FloatArray, n: int, now: float, dynamics: int, q: float, t: float, w: FloatArray
 ) -> None:
@@ -169,7 +170,7 @@ def bring_to(
         left -= step
 
 
-@njit(cache=True)
+@njit(**PART)
 def start(
     X: FloatArray,
     P: FloatArray,
@@ -191,7 +192,7 @@ def start(
             P[h, i, i] = sigma_bias[h - 1] ** 2 if h > 0 else 0.0
 
 
-@njit(cache=True)
+@njit(**PART)
 def report_position(kind: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray, out: FloatArray) -> bool:
     """Fill `out` (3,) with the report's position in ECEF; false if it has no range."""
     if kind != DIRECTION:

@@ -12,10 +12,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import njit
 
 from boresight.kernels.gaussian import joseph_update, sandwich
 from boresight.kernels.observation import IntArray
+from boresight.kernels.options import PART, types
 from boresight.kernels.signatures import MATRIX, MOTION, OBSERVATION, STACK, VECTOR
 from boresight.types.sensor import FloatArray
 
@@ -92,7 +93,7 @@ def mix(
     return predicted, X_out, P_out
 
 
-@njit(cache=True)
+@njit(**PART)
 def place(labels: IntArray, i: int, size: int, label: int, guess: int) -> int:
     """Return the index of a label in row i, most often `guess`; -1 where it is not."""
     if guess < size and labels[i, guess] == label:
@@ -130,7 +131,7 @@ def combine(weights: FloatArray, X: FloatArray, P: FloatArray, n: int) -> tuple[
     return x, out
 
 
-@njit(cache=True)
+@njit(**PART)
 def rescale(scale: FloatArray, z: FloatArray, m: int, rows: IntArray, R: FloatArray) -> None:
     """Multiply R[:m, :m] by √scale on both sides; the first m entries of `rows` are set to the components it holds."""
     i = 0
@@ -176,7 +177,7 @@ def adapt(
         scale[c] = min(max((1.0 - g) * scale[c] + g * shown / nominal[i], 1.0 / limit), limit)
 
 
-@njit(cache=True)
+@njit(**PART)
 def learn(
     observe: Any,
     x: FloatArray,

@@ -12,17 +12,18 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import njit
 
 from boresight.kernels.gaussian import cholesky, sandwich, solve_lower
 from boresight.kernels.imm import INT_MATRIX, INTS, NEGLIGIBLE, STACKS, combine, markov, place
 from boresight.kernels.observation import IntArray
+from boresight.kernels.options import PART, types
 from boresight.kernels.signatures import MATRIX, MOTION, STACK, VECTOR
 from boresight.kernels.smoothing import smoother_gain
 from boresight.types.sensor import FloatArray
 
 
-@njit(cache=True)
+@njit(**PART)
 def seen_as(
     i: int, j: int, X: FloatArray, P: FloatArray, sizes: IntArray, labels: IntArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -48,7 +49,7 @@ def seen_as(
     return x, out, cross
 
 
-@njit(cache=True)
+@njit(**PART)
 def _log_density(e: FloatArray, P: FloatArray) -> float:
     """Return log N(e; 0, P) without its constant; hardly any where P is not positive definite."""
     n = e.shape[0]
@@ -63,7 +64,7 @@ def _log_density(e: FloatArray, P: FloatArray) -> float:
     return out
 
 
-@njit(cache=True)
+@njit(**PART)
 def step_back(
     motion: Any,
     parameters: FloatArray,

@@ -6,14 +6,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import njit
 
 from boresight.kernels.gaussian import cholesky, joseph_update, solve_lower
+from boresight.kernels.options import PART, types
 from boresight.kernels.signatures import CONDITIONED, MATRIX, OBSERVATION, VECTOR
 from boresight.types.sensor import FloatArray
 
 
-@njit(cache=True)
+@njit(**PART)
 def mahalanobis(L: FloatArray, a: FloatArray) -> float:
     """Return |L⁻¹a|² for a lower Cholesky factor L."""
     b = a.copy()

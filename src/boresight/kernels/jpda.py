@@ -13,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from boresight.kernels.jpda_exact import exact, plan, share
+from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -52,7 +53,7 @@ def marginals(
         first = last
 
 
-@njit(cache=True)
+@njit(**PART)
 def _roots(start: IntArray, column: IntArray, n_columns: int) -> IntArray:
     """Return (n_rows,) one number for each cluster of rows: union–find over the columns."""
     n = len(start) - 1
@@ -77,7 +78,7 @@ def _roots(start: IntArray, column: IntArray, n_columns: int) -> IntArray:
     return parent
 
 
-@njit(cache=True)
+@njit(**PART)
 def _cluster(
     rows: IntArray, start: IntArray, column: IntArray, weight: FloatArray, miss: FloatArray, local: IntArray,
     most: float, p: FloatArray, p_miss: FloatArray, way: IntArray,
@@ -132,7 +133,7 @@ def _cluster(
         p_miss[rows[a]], way[rows[a]] = q_miss[a], found
 
 
-@njit(cache=True)
+@njit(**PART)
 def _turned(begin: IntArray, col: IntArray, m: int) -> tuple[IntArray, IntArray, IntArray]:
     """Return the same pairs by columns: their beginnings (m + 1,), rows, and where each stands among the others."""
     turned = np.zeros(m + 1, np.int64)
@@ -149,7 +150,7 @@ def _turned(begin: IntArray, col: IntArray, m: int) -> tuple[IntArray, IntArray,
     return turned, rows, back
 
 
-@njit(cache=True)
+@njit(**PART)
 def _by_columns(
     turned: IntArray, row: IntArray, back: IntArray, w: FloatArray, u: FloatArray, order: IntArray,
     q: FloatArray, q_miss: FloatArray, begin: IntArray,
@@ -176,7 +177,7 @@ def _by_columns(
         q_miss[i] = max(rest, 0.0)
 
 
-@njit(cache=True)
+@njit(**PART)
 def _messages(
     begin: IntArray, col: IntArray, w: FloatArray, u: FloatArray, m: int, q: FloatArray, q_miss: FloatArray
 ) -> None:

@@ -13,13 +13,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
 IntArray = NDArray[np.int64]
 MOST_OPEN = 30  # columns
 
 
-@njit(cache=True)
+@njit(**PART)
 def plan(begin: IntArray, col: IntArray, m: int, most: float, order: IntArray) -> float:
     """Fill `order` (n,) with the rows so that few columns are open at a time; returns the states, inf beyond `most`.
 
@@ -52,7 +53,7 @@ def plan(begin: IntArray, col: IntArray, m: int, most: float, order: IntArray) -
     return states
 
 
-@njit(cache=True)
+@njit(**PART)
 def _slots(
     begin: IntArray, col: IntArray, m: int, order: IntArray, bit: IntArray, keep: IntArray, size: IntArray,
     moves: IntArray,
@@ -97,7 +98,7 @@ def _slots(
     moves[moved, 0] = -1
 
 
-@njit(cache=True)
+@njit(**PART)
 def _narrowed(k: int, room: int, keep: int, moves: IntArray, move: int, to: IntArray) -> int:
     """Fill `to` (room,) with what each state while row k is taken becomes after it; return the next first move."""
     for s in range(room):
@@ -111,7 +112,7 @@ def _narrowed(k: int, room: int, keep: int, moves: IntArray, move: int, to: IntA
     return move
 
 
-@njit(cache=True)
+@njit(**PART)
 def exact(
     begin: IntArray, col: IntArray, w: FloatArray, u: FloatArray, m: int, order: IntArray, q: FloatArray,
     q_miss: FloatArray,
@@ -163,7 +164,7 @@ def exact(
         rest, before = before, rest
 
 
-@njit(cache=True)
+@njit(**PART)
 def _free(u: float, bit: IntArray, w: FloatArray, first: int, last: int) -> float:
     """Return the weight of what a row can do without taking from others: be left alone, or take a column of its own."""
     for e in range(first, last):
@@ -172,7 +173,7 @@ def _free(u: float, bit: IntArray, w: FloatArray, first: int, last: int) -> floa
     return u
 
 
-@njit(cache=True)
+@njit(**PART)
 def _room(size: int, bit: IntArray, first: int, last: int) -> int:
     """Return how many states there are while a row is taken: its new reports have bits beyond `size`."""
     for e in range(first, last):
@@ -210,7 +211,7 @@ def _weigh(past: FloatArray, at: int, size: int, u: float, wide: FloatArray, bef
     return total
 
 
-@njit(cache=True)
+@njit(**PART)
 def _scale(a: FloatArray, first: int, last: int) -> None:
     """Divide a[first:last] by its sum."""
     total = 0.0
@@ -221,7 +222,7 @@ def _scale(a: FloatArray, first: int, last: int) -> None:
             a[s] /= total
 
 
-@njit(cache=True)
+@njit(**PART)
 def share(q: FloatArray, q_miss: FloatArray, i: int, first: int, last: int) -> None:
     """Make a row's marginals add up to one; where no joint event has any weight, the row is left alone."""
     total = q_miss[i]

@@ -6,7 +6,7 @@ import math
 
 from numba import njit
 
-from boresight.kernels.options import BARE, LEAF
+from boresight.kernels.options import KERNEL, LEAF, SMALL
 from boresight.types.sensor import FloatArray
 
 
@@ -26,7 +26,7 @@ def measure_axes(
             H[4 + i, 3 + j] = 0.0
 
 
-@njit(**BARE)
+@njit(**KERNEL)
 def measure(
     position: FloatArray,
     velocity: FloatArray,
@@ -91,7 +91,7 @@ def measure(
     return rho
 
 
-@njit(**LEAF)
+@njit(**SMALL)
 def wrap(angle: float) -> float:
     """Wrap an angle to [-π, π) (rad)."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))

@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numba import njit
 
+from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
 CHAIN, SINGER, TURN, TURNING = 0, 1, 2, 3  # parameters[0]
@@ -23,7 +24,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 
 
-@njit(cache=True)
+@njit(**PART)
 def _apply(F: FloatArray, x: FloatArray, x_out: FloatArray) -> None:
     n = x.shape[0]
     for i in range(n):
@@ -33,7 +34,7 @@ def _apply(F: FloatArray, x: FloatArray, x_out: FloatArray) -> None:
         x_out[i] = s
 
 
-@njit(cache=True)
+@njit(**PART)
 def white_derivative(
     x: FloatArray, dt: float, parameters: FloatArray, x_out: FloatArray, F: FloatArray, Q: FloatArray
 ) -> None:
@@ -77,7 +78,7 @@ def white_derivative(
     _apply(F, x, x_out)
 
 
-@njit(cache=True)
+@njit(**PART)
 def _decay(alpha: float, s: float) -> tuple[float, float, float]:
     """Return what an acceleration impulse that decays at rate `alpha` leaves after s: position, velocity, itself."""
     a = alpha * s
@@ -89,7 +90,7 @@ def _decay(alpha: float, s: float) -> tuple[float, float, float]:
     return second, first, e
 
 
-@njit(cache=True)
+@njit(**PART)
 def singer(x: FloatArray, dt: float, parameters: FloatArray, x_out: FloatArray, F: FloatArray, Q: FloatArray) -> None:
     """Acceleration as an Ornstein-Uhlenbeck process (Singer 1970): `parameters` = (SINGER, d, tau, sigma).
 
@@ -122,7 +123,7 @@ def singer(x: FloatArray, dt: float, parameters: FloatArray, x_out: FloatArray, 
     _apply(F, x, x_out)
 
 
-@njit(cache=True)
+@njit(**PART)
 def _arc(w: float, s: float) -> tuple[float, float, float, float]:
     """Return sin(ws)/w, (1 - cos(ws))/w and their derivatives with respect to w; smooth through w = 0."""
     a = w * s
@@ -138,7 +139,7 @@ def _arc(w: float, s: float) -> tuple[float, float, float, float]:
     return sine / w, versine / w, (a * math.cos(a) - sine) / w**2, (a * sine - versine) / w**2
 
 
-@njit(cache=True)
+@njit(**PART)
 def _turn(w: float, s: float, d: int, F: FloatArray) -> None:
     """Fill the position and velocity part of F for turning at rate `w` over `s`."""
     S, C, _, _ = _arc(w, s)
@@ -158,7 +159,7 @@ def _turn(w: float, s: float, d: int, F: FloatArray) -> None:
         F[2, 5] = s
 
 
-@njit(cache=True)
+@njit(**PART)
 def _turn_noise(w: float, dt: float, d: int, q: float, rate: float, v: FloatArray, Q: FloatArray) -> None:
     """Fill Q: white acceleration q on every axis, and `rate` (rad²/s³) on the turn rate of velocity `v` (d,)."""
     n = Q.shape[0]
@@ -184,7 +185,7 @@ def _turn_noise(w: float, dt: float, d: int, q: float, rate: float, v: FloatArra
                         Q[i, j] += weight * rate * g[i] * g[j]
 
 
-@njit(cache=True)
+@njit(**PART)
 def _turn_sensitivity(w: float, s: float, c: float, n: float, v: FloatArray, d: int, g: FloatArray) -> None:
     """Fill the derivative by the rate of position and velocity after `s`; `v` is first turned by (c, n)."""
     e, o = c * v[0] - n * v[1], n * v[0] + c * v[1]
@@ -196,7 +197,7 @@ def _turn_sensitivity(w: float, s: float, c: float, n: float, v: FloatArray, d: 
     g[d + 1] = s * (cs * e - ns * o)
 
 
-@njit(cache=True)
+@njit(**PART)
 def coordinated_turn(
     x: FloatArray, dt: float, parameters: FloatArray, x_out: FloatArray, F: FloatArray, Q: FloatArray
 ) -> None:
@@ -210,7 +211,7 @@ def coordinated_turn(
     _apply(F, x, x_out)
 
 
-@njit(cache=True)
+@njit(**PART)
 def turning(x: FloatArray, dt: float, parameters: FloatArray, x_out: FloatArray, F: FloatArray, Q: FloatArray) -> None:
     """Turn at a rate that is part of the state (position, velocity, rate): `parameters` = (TURNING, d, q, q_rate).
 

@@ -13,10 +13,11 @@ import math
 import numpy as np
 from numba import njit
 
+from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
 
-@njit(cache=True)
+@njit(**PART)
 def _triad(azimuth: float, elevation: float) -> FloatArray:
     """Return rows u, e_θ, e_β in ENU."""
     s, c = math.sin(azimuth), math.cos(azimuth)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import njit
 
 from boresight.kernels.gaussian import joseph_update, sandwich
 from boresight.kernels.measurement import wrap
@@ -18,6 +18,7 @@ from boresight.kernels.msc import (
     jacobian,
     msc_from_cartesian,
 )
+from boresight.kernels.options import PART, types
 from boresight.kernels.signatures import MATRIX, MOTION, OBSERVATION, STACK, VECTOR
 from boresight.types.sensor import FloatArray
 
@@ -40,7 +41,7 @@ def msc_from_world(x: FloatArray, own: FloatArray) -> FloatArray:
     return msc_from_cartesian(s)
 
 
-@njit(cache=True)
+@njit(**PART)
 def msc_condition(
     y: FloatArray, P: FloatArray, innovation: FloatArray, H: FloatArray, R: FloatArray
 ) -> tuple[FloatArray, FloatArray, float]:

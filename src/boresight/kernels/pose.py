@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from boresight.kernels import geodesy, rotation
+from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
 _ecef_from_enu = geodesy.ecef_from_enu
@@ -23,7 +24,7 @@ _from_rotation_vector = rotation.quaternion_from_rotation_vector
 FIT_SPAN = 1.0  # s that the last four attitude stamps may span for their curve to be worth following
 
 
-@njit(cache=True)
+@njit(**PART)
 def segment(nodes: FloatArray, t: float) -> int:
     """Return i with nodes[i] <= t < nodes[i + 1], kept within the first and the last segment."""
     i = int(np.searchsorted(nodes, t, side="right")) - 1
@@ -70,7 +71,7 @@ def interpolate_position(
     return p, v
 
 
-@njit(cache=True)
+@njit(**PART)
 def interpolate_attitude(
     nodes: FloatArray, quaternion: FloatArray, steps: FloatArray, t: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -104,7 +105,7 @@ def interpolate_attitude(
     return R, rate
 
 
-@njit(cache=True)
+@njit(**PART)
 def _foretell(nodes: FloatArray, quaternion: FloatArray, t: float, R: FloatArray, rate: FloatArray) -> None:
     """Fill `R` and `rate` at `t` after the last of four stamps: a quadratic of the turns by least squares.
 
@@ -144,7 +145,7 @@ def _foretell(nodes: FloatArray, quaternion: FloatArray, t: float, R: FloatArray
     _fill_matrix(q[0], q[1], q[2], q[3], R)
 
 
-@njit(cache=True)
+@njit(**PART)
 def _turn(a: float, b: float, c: float, dt: float) -> tuple[float, float, float, float]:
     """Return the quaternion of turning at the rate (a, b, c) (rad/s) for `dt` (s)."""
     rate = math.sqrt(a * a + b * b + c * c)
@@ -153,7 +154,7 @@ def _turn(a: float, b: float, c: float, dt: float) -> tuple[float, float, float,
     return math.cos(half), k * a, k * b, k * c
 
 
-@njit(cache=True)
+@njit(**PART)
 def add_lever_arm(
     position: FloatArray, velocity: FloatArray, enu_from_body: FloatArray, rate: FloatArray, arm: FloatArray
 ) -> None:
@@ -169,7 +170,7 @@ def add_lever_arm(
             velocity[k, j] += R[j, 0] * spin[0] + R[j, 1] * spin[1] + R[j, 2] * spin[2]
 
 
-@njit(cache=True)
+@njit(**PART)
 def sensor_axes(enu_from_body: FloatArray, body_from_mount: FloatArray) -> FloatArray:
     """Return (n, 3, 3): columns right, forward, up of a sensor mounted by `body_from_mount` (3, 3), in ENU."""
     out = np.empty_like(enu_from_body)
@@ -184,7 +185,7 @@ def sensor_axes(enu_from_body: FloatArray, body_from_mount: FloatArray) -> Float
     return out
 
 
-@njit(cache=True)
+@njit(**PART)
 def local_level(position: FloatArray, lat0: float, lon0: float, h0: float) -> FloatArray:
     """Return (n, 3, 3): the site's ENU from the ENU of a platform at `position` (n, 3), over the ellipsoid."""
     out = np.empty((len(position), 3, 3))
@@ -203,7 +204,7 @@ def local_level(position: FloatArray, lat0: float, lon0: float, h0: float) -> Fl
     return out
 
 
-@njit(cache=True)
+@njit(**PART)
 def first_uncovered(nodes: FloatArray, t: FloatArray, max_gap: float, max_extrapolation: float) -> tuple[int, float]:
     """Return the first row of `t` that the nodes do not cover and its gap (s; 0 beyond the ends); (-1, 0) if none."""
     last = len(nodes) - 1
@@ -217,7 +218,7 @@ def first_uncovered(nodes: FloatArray, t: FloatArray, max_gap: float, max_extrap
     return -1, 0.0
 
 
-@njit(cache=True)
+@njit(**PART)
 def slopes(nodes: FloatArray, position: FloatArray, window: float) -> FloatArray:
     """Return velocities (n, 3): least-squares slopes over the nodes within ±window (s), at least the neighbours."""
     n = len(nodes)

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from boresight.kernels.options import PART
 from boresight.kernels.pose import first_uncovered, interpolate_attitude, interpolate_position, segment, slopes
 from boresight.types.sensor import FloatArray
 
@@ -13,7 +14,7 @@ Flags = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 
 
-@njit(cache=True)
+@njit(**PART)
 def stamps_for(times: FloatArray, nodes: FloatArray, known: float, limits: tuple[float, float]) -> int:
     """Return how many stamps are known until `known` (s), 0 where a pose at one of the `times` cannot come of them."""
     n = int(np.searchsorted(nodes, known, side="right"))

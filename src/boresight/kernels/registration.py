@@ -12,14 +12,14 @@ import math
 import numpy as np
 from numba import njit
 
-from boresight.kernels.options import LEAF
+from boresight.kernels.options import PART, SMALL
 from boresight.types.sensor import FloatArray
 
 TIME, RANGE, SCALE, AZIMUTH, ELEVATION = 0, 1, 2, 3, 4
 N_PARAMETERS = 5
 
 
-@njit(**LEAF)
+@njit(**SMALL)
 def sensitivity(z: FloatArray, h6: FloatArray, closing: FloatArray, S: FloatArray) -> None:
     """Fill `S` (7, 5): how the components of a measurement `z` (7,) change with the sensor's constant errors.
 
@@ -46,7 +46,7 @@ def sensitivity(z: FloatArray, h6: FloatArray, closing: FloatArray, S: FloatArra
     S[6, ELEVATION] = flat
 
 
-@njit(cache=True)
+@njit(**PART)
 def learned(x: FloatArray, P: FloatArray, first: int, info: FloatArray, vector: FloatArray) -> None:
     """Fill the information matrix (k, k) and vector (k,) that a track's states from `first` on hold."""
     inverse = np.linalg.inv(np.ascontiguousarray(P[first:, first:]))
@@ -58,7 +58,7 @@ def learned(x: FloatArray, P: FloatArray, first: int, info: FloatArray, vector: 
             vector[a] += info[a, b] * x[first + b]
 
 
-@njit(cache=True)
+@njit(**PART)
 def pool(
     x: FloatArray,
     P: FloatArray,

@@ -6,14 +6,15 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import njit
 
 from boresight.kernels.measurement import measure
+from boresight.kernels.options import PART, types
 from boresight.kernels.signatures import MATRIX, MOTION, STACK, VECTOR
 from boresight.types.sensor import FloatArray
 
 
-@njit(cache=True)
+@njit(**PART)
 def root(Q: FloatArray, L: FloatArray) -> None:
     """Fill the lower triangular `L` with L L' = Q for a positive semidefinite Q; a zero pivot gives a zero column."""
     n = Q.shape[0]

@@ -6,10 +6,11 @@ import numpy as np
 from numba import njit
 
 from boresight.kernels.gaussian import cholesky, solve_lower, solve_upper
+from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
 
-@njit(cache=True)
+@njit(**PART)
 def smoother_gain(P: FloatArray, F: FloatArray, P_predicted: FloatArray) -> FloatArray:
     """Return G = P Fᵀ P_predicted⁻¹ (m, n); P (m, n) is the covariance of what is smoothed with what was moved by F."""
     m, n = P.shape

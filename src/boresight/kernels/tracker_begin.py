@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from boresight.kernels.options import LEAF
+from boresight.kernels.options import LEAF, PART
 from boresight.kernels.registration import TIME, learned, pool
 from boresight.kernels.tracker import (
     AZIMUTH_BINS,
@@ -30,7 +30,7 @@ from boresight.kernels.tracker_workroom import workroom
 from boresight.types.sensor import FloatArray
 
 
-@njit(cache=True)
+@njit(**PART)
 def begin(
     tr: Tracks,
     s: Settings,
@@ -139,7 +139,7 @@ def pooled_constants(tr: Tracks, s: Settings) -> FloatArray:
     return pooled
 
 
-@njit(cache=True)
+@njit(**PART)
 def tell(tr: Tracks, i: int, s: Settings, pooled: FloatArray) -> None:
     """Give a new track what is known of the constant errors, and note what it was told."""
     k = s.n_constant
@@ -155,7 +155,7 @@ def tell(tr: Tracks, i: int, s: Settings, pooled: FloatArray) -> None:
             tr.P[i, first + a, first + b] = 0.5 * (covariance[a, b] + covariance[b, a])
 
 
-@njit(cache=True)
+@njit(**PART)
 def apply_constants(
     tr: Tracks,
     i: int,
@@ -179,7 +179,8 @@ def apply_constants(
     for p in range(len(sensor.constant)):
         j = sensor.constant[p]
         if j >= 0:
-            full[:, j] = C[:d, p]
+            for a in range(d):
+                full[a, j] = C[a, p]
     for a in range(d):
         for j in range(first, n):
             x[a] -= full[a, j] * x[j]
@@ -203,7 +204,7 @@ def apply_constants(
             P[d + a, a] = P[a, d + a]
 
 
-@njit(cache=True)
+@njit(**PART)
 def save_lesson(tr: Tracks, i: int, s: Settings) -> None:
     """Keep what a track that ends, or becomes another, has learned of the constant errors."""
     k = s.n_constant
@@ -218,7 +219,7 @@ def save_lesson(tr: Tracks, i: int, s: Settings) -> None:
     tr.told[i, :, k] = vector
 
 
-@njit(cache=True)
+@njit(**PART)
 def condition_on_rate(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int) -> None:
     """Give a new track what its first range rate tells of the velocity."""
     n = tr.x.shape[1]

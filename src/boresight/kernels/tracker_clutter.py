@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from boresight.kernels.options import LEAF
+from boresight.kernels.options import LEAF, PART
 from boresight.kernels.tracker import AZIMUTH_BINS, NOTHING, STATIC, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_place import volume_of
 from boresight.kernels.tracker_state import components
@@ -37,7 +37,7 @@ def clutter_density(tr: Tracks, s: Settings, sensor: SensorTable, z: FloatArray,
     return float(local / (volume * share))
 
 
-@njit(cache=True)
+@njit(**PART)
 def log_densities(tr: Tracks, s: Settings, sensor: SensorTable, look: Look, out: FloatArray) -> int:
     """Fill the log clutter density at every detection (m,); returns the largest number of components."""
     most = 0
@@ -60,7 +60,7 @@ def log_densities(tr: Tracks, s: Settings, sensor: SensorTable, look: Look, out:
     return most
 
 
-@njit(cache=True)
+@njit(**PART)
 def learn_clutter(
     tr: Tracks,
     s: Settings,

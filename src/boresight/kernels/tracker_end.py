@@ -6,13 +6,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from boresight.kernels.options import LEAF
+from boresight.kernels.options import LEAF, PART
 from boresight.kernels.tracker import HIDDEN, STATIC, VISIBLE, Extras, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_begin import save_lesson
 from boresight.kernels.tracker_copies import put1, put2, put3
 
 
-@njit(cache=True)
+@njit(**PART)
 def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look, extras: Extras) -> None:
     """Show the tracks that are probably moving targets within the range for which the sensor answers."""
     last = len(look.dt)
@@ -43,7 +43,7 @@ def stands_apart(tr: Tracks, i: int, s: Settings) -> bool:
     return True
 
 
-@njit(cache=True)
+@njit(**PART)
 def end_and_merge(tr: Tracks, s: Settings, merging: bool, start: IntArray, extras: Extras) -> None:
     """Drop tracks that are probably nothing, and the weaker of two that have become one.
 
@@ -87,7 +87,7 @@ def move(tr: Tracks, i: int, to: int) -> None:
     put3(tr.told, to, tr.told, i, 1)
 
 
-@njit(cache=True)
+@njit(**PART)
 def merge(tr: Tracks, s: Settings, keep: NDArray[np.bool_], extras: Extras) -> None:
     """Take the weaker of two tracks that have become one out of `keep`."""
     order = np.argsort(tr.x[: tr.live[0], 0])  # neighbours lie next to each other in the east

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from boresight.kernels.options import LEAF
+from boresight.kernels.options import LEAF, PART
 from boresight.kernels.registration import TIME
 from boresight.kernels.tracker import GATED, UNASSOCIATED, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_clutter import log_densities
@@ -77,7 +77,7 @@ def reach_of(tr: Tracks, i: int, s: Settings, spread: float, dt: float, gate: fl
     return 2.0 * math.sqrt(gate * total) + dt * math.sqrt(speed)
 
 
-@njit(cache=True)
+@njit(**PART)
 def gate_all(
     tr: Tracks,
     s: Settings,
@@ -181,15 +181,17 @@ def place_in(ascending: FloatArray, value: float) -> int:
     return first
 
 
-@njit(cache=True)
+@njit(**PART)
 def grown(a: FloatArray, room: int) -> FloatArray:
     b = np.empty(room)
-    b[: len(a)] = a
+    for i in range(len(a)):  # an assignment of slices takes two seconds to compile
+        b[i] = a[i]
     return b
 
 
-@njit(cache=True)
+@njit(**PART)
 def grown_int(a: IntArray, room: int) -> IntArray:
     b = np.empty(room, np.int64)
-    b[: len(a)] = a
+    for i in range(len(a)):
+        b[i] = a[i]
     return b

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from boresight.kernels.jpda import marginals
+from boresight.kernels.options import PART
 from boresight.kernels.tracker import HIDDEN, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_place import Places
 from boresight.kernels.tracker_state import condition, existence, learners
@@ -50,7 +51,7 @@ def shares(
     return p
 
 
-@njit(cache=True)
+@njit(**PART)
 def take_shares(
     tr: Tracks,
     i: int,
@@ -83,7 +84,7 @@ def take_shares(
         note_hit(tr, i, s, sensor, look.t + look.dt[own], moves)
 
 
-@njit(cache=True)
+@njit(**PART)
 def still_ratio(
     tr: Tracks,
     i: int,

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from boresight.kernels.measurement import measure
-from boresight.kernels.options import LEAF
+from boresight.kernels.options import LEAF, PART
 from boresight.kernels.registration import N_PARAMETERS, sensitivity
 from boresight.kernels.tracker import IntArray, Look, SensorTable, Settings
 from boresight.kernels.tracker_workroom import Workroom
@@ -141,7 +141,7 @@ def covered(z: FloatArray, sensor: SensorTable) -> bool:
     return bool(within(range_m, azimuth, z[2], sensor, 1.0))
 
 
-@njit(cache=True)
+@njit(**PART)
 def places_of(look: Look, s: Settings, sensor: SensorTable, usable: NDArray[np.bool_]) -> Places:
     """Return where all usable detections of a look lie."""
     m = len(look.dt)

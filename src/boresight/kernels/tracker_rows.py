@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from boresight.kernels.options import BARE
+from boresight.kernels.options import BARE, KERNEL
 from boresight.kernels.tracker import HIDDEN, VISIBLE, IntArray, Settings, Tracks
 from boresight.kernels.tracker_copies import longer
 from boresight.types.sensor import FloatArray
@@ -109,7 +109,7 @@ def next_expected(clock: Clock, period: FloatArray) -> float:
     return soonest
 
 
-@njit(**BARE)
+@njit(**KERNEL)
 def times_due(clock: Clock, period: FloatArray, t_recv: float) -> int:
     """Return at how many times rows may be due for the newest arrival and from then until `t_recv` (s): not fewer."""
     now = clock.now[ARRIVAL]
@@ -119,7 +119,7 @@ def times_due(clock: Clock, period: FloatArray, t_recv: float) -> int:
     return int(ahead + max(late, 0.0)) + 4
 
 
-@njit(**BARE)
+@njit(**KERNEL)
 def rows_at_arrival(
     tr: Tracks, s: Settings, clock: Clock, period: FloatArray, coast_after: float, rows: RowTable
 ) -> None:

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from boresight.kernels.measurement import measure, wrap
-from boresight.kernels.options import LEAF
+from boresight.kernels.options import LEAF, PART
 from boresight.kernels.tracker import (
     INITIATED,
     NOTHING,
@@ -40,7 +40,7 @@ def unplaced(tr: Tracks) -> bool:
     return found
 
 
-@njit(cache=True)
+@njit(**PART)
 def begin_beside(
     tr: Tracks,
     s: Settings,
@@ -117,7 +117,7 @@ def nearest_bearing(look: Look, usable: NDArray[np.bool_], azimuth: float, reach
     return best
 
 
-@njit(cache=True)
+@njit(**PART)
 def place_beside(
     tr: Tracks,
     host: int,
@@ -154,7 +154,7 @@ def place_beside(
     w[NOTHING] = 1.0 - s.blob_share
 
 
-@njit(cache=True)
+@njit(**PART)
 def keep_beside(
     tr: Tracks,
     s: Settings,
@@ -194,7 +194,7 @@ def keep_beside(
             join(tr, i, host, s)
 
 
-@njit(cache=True)
+@njit(**PART)
 def shift(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int, own: int, z: FloatArray) -> None:
     """Measure how far track `i` stands across the line of sight from the one at `z` that has bearing `own`."""
     E = look.enu_from_sensor[k]

@@ -8,14 +8,14 @@ import numpy as np
 from numba import njit
 
 from boresight.kernels.measurement import measure, measure_axes, wrap
-from boresight.kernels.options import LEAF
+from boresight.kernels.options import LEAF, PART
 from boresight.kernels.registration import N_PARAMETERS, TIME, sensitivity
 from boresight.kernels.tracker import HIDDEN, NOTHING, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
 
-@njit(cache=True)
+@njit(**PART)
 def predict_all(tr: Tracks, s: Settings, t: float) -> None:
     """Predict every track to time `t`: state (exact white-acceleration CV), biases, hypotheses."""
     dt = t - tr.time[0]
