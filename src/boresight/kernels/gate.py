@@ -6,12 +6,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from boresight.kernels.assignment import assign_sparse
 from boresight.kernels.gaussian import cholesky
 from boresight.kernels.observation import IntArray
-from boresight.kernels.options import PART, types
+from boresight.kernels.options import PART
 from boresight.kernels.signatures import MATRIX, STACK, VECTOR
 from boresight.types.sensor import FloatArray
 

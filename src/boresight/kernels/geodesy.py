@@ -7,7 +7,6 @@ import math
 import numpy as np
 from numba import njit
 
-from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
 A = 6378137.0  # m, semi-major axis of WGS84
@@ -95,13 +94,13 @@ def ecef_from_enu(east: float, north: float, up: float, lat0: float, lon0: float
     return x0 + dx, y0 + dy, z0 + dz
 
 
-@njit(**PART)
+@njit(cache=True)
 def _turn_to_enu(dx: float, dy: float, dz: float, sp: float, cp: float, sl: float, cl: float) -> Triple:
     outward = cl * dx + sl * dy
     return -sl * dx + cl * dy, cp * dz - sp * outward, cp * outward + sp * dz
 
 
-@njit(**PART)
+@njit(cache=True)
 def _turn_to_ecef(east: float, north: float, up: float, sp: float, cp: float, sl: float, cl: float) -> Triple:
     outward = cp * up - sp * north
     return cl * outward - sl * east, sl * outward + cl * east, sp * up + cp * north
@@ -154,7 +153,7 @@ def ecef_from_enu_rotation(latitude: float, longitude: float) -> FloatArray:
     return R
 
 
-@njit(**PART)
+@njit(cache=True)
 def fill_ecef_from_enu(sp: float, cp: float, sl: float, cl: float, R: FloatArray) -> None:
     """Fill `R` (3, 3) with east, north, up in ECEF axes, of sine and cosine of latitude and longitude."""
     R[0, 0], R[0, 1], R[0, 2] = -sl, -sp * cl, cp * cl
@@ -193,7 +192,7 @@ def geodetic_from_ecef_jacobian(x: FloatArray, y: FloatArray, z: FloatArray) -> 
     return J
 
 
-@njit(**PART)
+@njit(cache=True)
 def radii_of_curvature(latitude: float) -> tuple[float, float]:
     """Return the meridian's and the prime vertical's radius of curvature (m)."""
     s = math.sin(latitude)

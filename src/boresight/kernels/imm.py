@@ -12,11 +12,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from boresight.kernels.gaussian import joseph_update, sandwich
 from boresight.kernels.observation import IntArray
-from boresight.kernels.options import PART, types
+from boresight.kernels.options import PART
 from boresight.kernels.signatures import MATRIX, MOTION, OBSERVATION, STACK, VECTOR
 from boresight.types.sensor import FloatArray
 

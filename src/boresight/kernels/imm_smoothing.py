@@ -12,12 +12,12 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from boresight.kernels.gaussian import cholesky, sandwich, solve_lower
 from boresight.kernels.imm import INT_MATRIX, INTS, NEGLIGIBLE, STACKS, combine, markov, place
 from boresight.kernels.observation import IntArray
-from boresight.kernels.options import PART, types
+from boresight.kernels.options import PART
 from boresight.kernels.signatures import MATRIX, MOTION, STACK, VECTOR
 from boresight.kernels.smoothing import smoother_gain
 from boresight.types.sensor import FloatArray

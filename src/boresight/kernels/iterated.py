@@ -6,10 +6,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from boresight.kernels.gaussian import cholesky, joseph_update, solve_lower
-from boresight.kernels.options import PART, types
+from boresight.kernels.options import PART
 from boresight.kernels.signatures import CONDITIONED, MATRIX, OBSERVATION, VECTOR
 from boresight.types.sensor import FloatArray
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from boresight.kernels.gaussian import joseph_update, sandwich
 from boresight.kernels.measurement import wrap
@@ -18,7 +18,7 @@ from boresight.kernels.msc import (
     jacobian,
     msc_from_cartesian,
 )
-from boresight.kernels.options import PART, types
+from boresight.kernels.options import PART
 from boresight.kernels.signatures import MATRIX, MOTION, OBSERVATION, STACK, VECTOR
 from boresight.types.sensor import FloatArray
 

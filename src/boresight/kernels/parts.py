@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import ir
-from numba import _dynfunc
+from numba._dynfunc import make_function
 from numba.core import cgutils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -53,9 +53,7 @@ class PartLowering(NativeLowering):
         made, name = state["cr"], state.func_id.func_name
         _refuse_python(context, library, made.fndesc.llvm_cpython_wrapper_name, name)
         refusal = _refusal(context)
-        entry = _dynfunc.make_function(
-            made.fndesc.lookup_module(), name, "part of a kernel", refusal, made.env, (library,)
-        )
+        entry = make_function(made.fndesc.lookup_module(), name, "part of a kernel", refusal, made.env, (library,))
         context.insert_user_function(entry, made.fndesc, [library])
         state["cr"] = made._replace(cfunc=entry)
         return True

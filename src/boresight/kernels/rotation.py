@@ -7,7 +7,6 @@ import math
 import numpy as np
 from numba import njit
 
-from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
 GIMBAL_LOCK = 1e-9  # cosine of pitch below which yaw and roll are one angle
@@ -61,7 +60,7 @@ def matrix_from_quaternion(q: FloatArray) -> FloatArray:
     return R
 
 
-@njit(**PART)
+@njit(cache=True)
 def fill_matrix(w: float, x: float, y: float, z: float, R: FloatArray) -> None:
     """Fill `R` (3, 3) with the rotation of the quaternion (w, x, y, z); NaN where its norm is not one."""
     norm2 = w * w + x * x + y * y + z * z
@@ -71,7 +70,7 @@ def fill_matrix(w: float, x: float, y: float, z: float, R: FloatArray) -> None:
     R[2, 0], R[2, 1], R[2, 2] = k * (x * z - w * y), k * (y * z + w * x), 1.0 - k * (x * x + y * y)
 
 
-@njit(**PART)
+@njit(cache=True)
 def quaternion_from_matrix(R: FloatArray) -> FloatArray:
     """Return the unit quaternion (4,) of a rotation (3, 3), with w >= 0 (Shepperd: from the largest component)."""
     q = np.empty(4)
@@ -99,7 +98,7 @@ def quaternion_from_matrix(R: FloatArray) -> FloatArray:
     return q
 
 
-@njit(**PART)
+@njit(cache=True)
 def multiply(p: FloatArray, q: FloatArray) -> FloatArray:
     """Return the quaternion product p q (4,): the rotation q first, then p."""
     o = np.empty(4)
@@ -110,7 +109,7 @@ def multiply(p: FloatArray, q: FloatArray) -> FloatArray:
     return o
 
 
-@njit(**PART)
+@njit(cache=True)
 def quaternion_from_rotation_vector(v: FloatArray) -> FloatArray:
     """Return the unit quaternion (4,) of a rotation vector (3,) (rad, axis times angle)."""
     q = np.empty(4)
@@ -122,7 +121,7 @@ def quaternion_from_rotation_vector(v: FloatArray) -> FloatArray:
     return q
 
 
-@njit(**PART)
+@njit(cache=True)
 def rotation_vector_from_quaternion(q: FloatArray) -> FloatArray:
     """Return the rotation vector (3,) of a unit quaternion, by the shorter way round (angle <= π)."""
     v = np.empty(3)
@@ -133,7 +132,7 @@ def rotation_vector_from_quaternion(q: FloatArray) -> FloatArray:
     return v
 
 
-@njit(**PART)
+@njit(cache=True)
 def step_between(p: FloatArray, q: FloatArray) -> FloatArray:
     """Return the rotation vector (3,), in the axes of `p`, that takes the attitude `p` to `q` the shorter way."""
     inverse = p.copy()
@@ -141,7 +140,7 @@ def step_between(p: FloatArray, q: FloatArray) -> FloatArray:
     return rotation_vector_from_quaternion(multiply(inverse, q))
 
 
-@njit(**PART)
+@njit(cache=True)
 def slerp(p: FloatArray, q: FloatArray, fraction: float) -> FloatArray:
     """Return the attitude (4,) at `fraction` of the shorter way from `p` to `q`, turning at a constant rate."""
     return multiply(p, quaternion_from_rotation_vector(fraction * step_between(p, q)))

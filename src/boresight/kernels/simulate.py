@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from boresight.kernels.measurement import measure
-from boresight.kernels.options import PART, types
+from boresight.kernels.options import PART
 from boresight.kernels.signatures import MATRIX, MOTION, STACK, VECTOR
 from boresight.types.sensor import FloatArray
 
