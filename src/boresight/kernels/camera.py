@@ -74,7 +74,7 @@ def undistort(c: FloatArray, xd: float, yd: float) -> Pair:
     return math.nan, math.nan
 
 
-@njit(**PART)
+@njit(cache=True)
 def pixel_from_direction(
     c: FloatArray, forward: FloatArray, right: FloatArray, down: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -91,7 +91,7 @@ def pixel_from_direction(
     return px, py
 
 
-@njit(**PART)
+@njit(cache=True)
 def direction_from_pixel(c: FloatArray, px: FloatArray, py: FloatArray) -> Arrays:
     """Return unit directions forward, right, down (n,) of pixels; NaN where no ray is distorted to the pixel."""
     n = len(px)
@@ -103,7 +103,7 @@ def direction_from_pixel(c: FloatArray, px: FloatArray, py: FloatArray) -> Array
     return forward, right, down
 
 
-@njit(**PART)
+@njit(cache=True)
 def pixel_from_direction_jacobian(
     c: FloatArray, forward: FloatArray, right: FloatArray, down: FloatArray
 ) -> FloatArray:
@@ -118,7 +118,7 @@ def pixel_from_direction_jacobian(
     return J
 
 
-@njit(**PART)
+@njit(cache=True)
 def direction_from_pixel_jacobian(c: FloatArray, px: FloatArray, py: FloatArray) -> FloatArray:
     """Return d(forward, right, down)/d(pixel), (n, 3, 2), of unit directions."""
     J = np.empty((len(px), 3, 2))

@@ -25,7 +25,7 @@ WAKE = 4.0  # rejections of one source in a row that wake the hypothesis that it
 ACCEPTED, REJECTED, WAITING, STALE = 0, 1, 2, 3
 
 
-@njit(**PART)
+@njit(cache=True)
 def step(
     clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, scale: FloatArray, run_of: FloatArray,
     settings: FloatArray, spread: FloatArray, source: int, kind: int, t: float, z: FloatArray, origin: FloatArray,
@@ -139,7 +139,7 @@ def _weigh(clock: FloatArray, L: FloatArray) -> None:
     clock[C_BEST] = best
 
 
-@njit(**PART)
+@njit(cache=True)
 def predict_to(
     clock: FloatArray, X: FloatArray, P: FloatArray, settings: FloatArray, t: float, position: FloatArray,
     velocity: FloatArray, covariance: FloatArray, w: FloatArray,
@@ -176,7 +176,7 @@ def predict_to(
     return True
 
 
-@njit(**PART)
+@njit(cache=True)
 def run(
     clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, scale: FloatArray, run_of: FloatArray,
     settings: FloatArray, spread: FloatArray, source: NDArray[np.int64], kind: NDArray[np.int64], t: FloatArray,

@@ -71,7 +71,7 @@ def interpolate_position(
     return p, v
 
 
-@njit(**PART)
+@njit(cache=True)
 def interpolate_attitude(
     nodes: FloatArray, quaternion: FloatArray, steps: FloatArray, t: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -154,7 +154,7 @@ def _turn(a: float, b: float, c: float, dt: float) -> tuple[float, float, float,
     return math.cos(half), k * a, k * b, k * c
 
 
-@njit(**PART)
+@njit(cache=True)
 def add_lever_arm(
     position: FloatArray, velocity: FloatArray, enu_from_body: FloatArray, rate: FloatArray, arm: FloatArray
 ) -> None:
@@ -170,7 +170,7 @@ def add_lever_arm(
             velocity[k, j] += R[j, 0] * spin[0] + R[j, 1] * spin[1] + R[j, 2] * spin[2]
 
 
-@njit(**PART)
+@njit(cache=True)
 def sensor_axes(enu_from_body: FloatArray, body_from_mount: FloatArray) -> FloatArray:
     """Return (n, 3, 3): columns right, forward, up of a sensor mounted by `body_from_mount` (3, 3), in ENU."""
     out = np.empty_like(enu_from_body)
@@ -185,7 +185,7 @@ def sensor_axes(enu_from_body: FloatArray, body_from_mount: FloatArray) -> Float
     return out
 
 
-@njit(**PART)
+@njit(cache=True)
 def local_level(position: FloatArray, lat0: float, lon0: float, h0: float) -> FloatArray:
     """Return (n, 3, 3): the site's ENU from the ENU of a platform at `position` (n, 3), over the ellipsoid."""
     out = np.empty((len(position), 3, 3))
@@ -204,7 +204,7 @@ def local_level(position: FloatArray, lat0: float, lon0: float, h0: float) -> Fl
     return out
 
 
-@njit(**PART)
+@njit(cache=True)
 def first_uncovered(nodes: FloatArray, t: FloatArray, max_gap: float, max_extrapolation: float) -> tuple[int, float]:
     """Return the first row of `t` that the nodes do not cover and its gap (s; 0 beyond the ends); (-1, 0) if none."""
     last = len(nodes) - 1
@@ -218,7 +218,7 @@ def first_uncovered(nodes: FloatArray, t: FloatArray, max_gap: float, max_extrap
     return -1, 0.0
 
 
-@njit(**PART)
+@njit(cache=True)
 def slopes(nodes: FloatArray, position: FloatArray, window: float) -> FloatArray:
     """Return velocities (n, 3): least-squares slopes over the nodes within ±window (s), at least the neighbours."""
     n = len(nodes)

@@ -13,6 +13,9 @@ from boresight.kernels.tracker import IntArray, Look, SensorTable
 from boresight.types.sensor import FloatArray
 
 NO_SENSOR = -1  # an arrival without a look: time has gone on
+PER_LOOK = ("t", "arrival", "sensor", "number")  # fields of `Looks`, and what one place in each stands for
+PER_DETECTION = ("dt", "z", "R", "row")
+PER_POSE = ("position", "velocity", "axes")
 
 
 class Looks(NamedTuple):
@@ -94,28 +97,50 @@ def moment(t_recv: float) -> Looks:
     )  # fmt: skip
 
 
-def joined(parts: list[Looks]) -> Looks:
-    """Return the looks of all parts, in their order."""
-    out = [np.concatenate(columns) for columns in zip(*parts, strict=True)]
-    shift = np.cumsum([0] + [len(p.dt) for p in parts])
-    first = [p.first[:-1] + s for p, s in zip(parts, shift)] + [shift[-1:]]
-    out[Looks._fields.index("first")] = np.concatenate(first)
-    return Looks(*out)
+def room_for(looks: int, detections: int) -> Looks:
+    """Return room for so many looks with so many detections in all; nothing is filled in but `first[0]`."""
+    one = no_looks()
+    count = dict.fromkeys(PER_LOOK, looks) | dict.fromkeys(PER_DETECTION, detections) | {"first": looks + 1}
+    count |= dict.fromkeys(PER_POSE, looks + detections)
+    out = Looks(**{name: np.empty((count[name], *a.shape[1:]), a.dtype) for name, a in one._asdict().items()})
+    out.first[0] = 0
+    return out
 
 
-def chosen(looks: Looks, which: IntArray) -> tuple[Looks, IntArray]:
-    """Return the looks `which` (k,), in that order, and the places that their detections had."""
+def front(looks: Looks, n: int) -> Looks:
+    """Return the first `n` looks; the arrays are views."""
+    m = int(looks.first[n])
+    count = dict.fromkeys(PER_LOOK, n) | dict.fromkeys(PER_DETECTION, m) | dict.fromkeys(PER_POSE, n + m)
+    return Looks(first=looks.first[: n + 1], **{name: getattr(looks, name)[:c] for name, c in count.items()})
+
+
+def put_behind(room: Looks, n: int, more: Looks) -> None:
+    """Write looks behind the first `n` of a table with room for them."""
+    k, a, m = len(more.t), int(room.first[n]), len(more.dt)
+    for name in PER_LOOK:
+        getattr(room, name)[n : n + k] = getattr(more, name)
+    for name in PER_DETECTION:
+        getattr(room, name)[a : a + m] = getattr(more, name)
+    for name in PER_POSE:
+        getattr(room, name)[a + n : a + n + m + k] = getattr(more, name)
+    room.first[n : n + k + 1] = a + more.first
+
+
+def chosen(looks: Looks, which: IntArray, room: Looks) -> IntArray:
+    """Write the looks `which` (k,), in that order, into `room`; returns the places that their detections had."""
     at, poses, first = places_of_looks(looks, which)
-    per_look = {name: getattr(looks, name)[which] for name in ("t", "arrival", "sensor", "number")}
-    per_detection = {name: getattr(looks, name)[at] for name in ("dt", "z", "R", "row")}
-    per_pose = {name: getattr(looks, name)[poses] for name in ("position", "velocity", "axes")}
-    return Looks(first=first, **per_look, **per_detection, **per_pose), at
+    room.first[: len(first)] = first
+    for names, places in ((PER_LOOK, which), (PER_DETECTION, at), (PER_POSE, poses)):
+        for name in names:  # "clip": without it, Numpy makes the array apart and copies it
+            np.take(getattr(looks, name), places, axis=0, out=getattr(room, name)[: len(places)], mode="clip")
+    return at
 
 
 def places_of_looks(looks: Looks, which: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     """Return where the detections and the poses of the looks `which` (k,) stand, and `first` (k + 1,) for these."""
     if len(which) == len(looks.t) and (which[1:] > which[:-1]).all():
-        return np.arange(len(looks.dt)), np.arange(len(looks.position)), looks.first
+        m = int(looks.first[-1])
+        return np.arange(m), np.arange(m + len(which)), looks.first
     count = looks.first[which + 1] - looks.first[which]
     first = np.concatenate([[0], np.cumsum(count)])
     detections = _ranges(looks.first[which], count, first)

@@ -60,12 +60,10 @@ def rows_of(table: RowTable, track_id: NDArray[np.int64]) -> Rows:
 
 def decisions_of(left: Left) -> Decisions:
     """Return what became of the detections of looks that have left the window."""
-    looks, fates = left
-    fate = _OF_CODE[fates.code]
-    outcome = np.repeat(fates.outcome, np.diff(looks.first))
-    fate[outcome == LATE] = FATES.index(Fate.LATE)
-    fate[outcome == NO_POSE] = FATES.index(Fate.SCREENED)
-    return Decisions(looks.row, fate, fates.owner, fates.nis)
+    fate = _OF_CODE[left.code]
+    fate[left.outcome == LATE] = FATES.index(Fate.LATE)
+    fate[left.outcome == NO_POSE] = FATES.index(Fate.SCREENED)
+    return Decisions(left.row, fate, left.owner, left.nis)
 
 
 def unseen(rows: Sequence[int]) -> Decisions:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from boresight.kernels.tracker_window import Fates
 from boresight.tracking.core import copy_tracks
 from boresight.tracking.names import Names
 from boresight.tracking.tracker import Tracker, TrackerState
-from boresight.tracking.window import Window
+from boresight.tracking.window import Window, held
 
 Arrays = dict[str, NDArray[np.generic]]
 FORMAT = 3
@@ -25,21 +26,19 @@ FORMAT = 3
 
 def snapshot(state: TrackerState) -> TrackerState:
     """Return an independent copy: `step` may consume the original."""
-    w = state.window
-    window = Window(
-        copy_tracks(w.tracks),
-        Copies._make(a.copy() for a in w.copies),
-        w.looks,  # these are never written to
-        Fates._make(a.copy() for a in w.fates),
-        Clock._make(a.copy() for a in w.clock),
-        w.arrivals,
+    w = held(state.window)
+    window = replace(
+        w,
+        tracks=copy_tracks(w.tracks),
+        copies=Copies._make(a.copy() for a in w.copies),
+        clock=Clock._make(a.copy() for a in w.clock),
     )
     return TrackerState(window, state.names.copy(), state.smoothed)
 
 
 def arrays_of_state(state: TrackerState) -> Arrays:
     """Return the state as named arrays (versioned; see `state_of_arrays`)."""
-    w, names = state.window, state.names
+    w, names = held(state.window), state.names
     out: Arrays = {
         "format": np.array([FORMAT]),
         "counts": np.array([w.arrivals, names.given], np.int64),
@@ -76,6 +75,8 @@ def state_of_arrays(arrays: Mapping[str, NDArray[np.generic]], tracker: Tracker)
         Looks(**_parts(arrays, "looks")),
         Fates(**_parts(arrays, "fates")),
         Clock(**_parts(arrays, "clock")),
+        np.arange(len(arrays["looks.t"])),
+        len(arrays["looks.t"]),
         int(np.asarray(arrays["counts"])[0]),
     )
     names = Names(int(np.asarray(arrays["counts"])[1]), **_parts(arrays, "names"))

@@ -17,7 +17,7 @@ from boresight.tracking.core import Plan, make_plan
 from boresight.tracking.lagged import smoothed_rows
 from boresight.tracking.names import Names
 from boresight.tracking.output import Decisions, Rows, decisions_of, rows_of, unseen
-from boresight.tracking.window import Left, Window, empty_window, take
+from boresight.tracking.window import Window, empty_window, take, what_became
 from boresight.types import NO_TRACK, Fate, FloatArray, Scan, Sensor
 
 REASON = {
@@ -143,7 +143,7 @@ class Tracker:
             self._write(state, rows, out)
         if self.config.smoothing_lag is not None:
             self._smooth(state, out, np.inf)
-        out.decisions.append(decisions_of(Left(window.looks, window.fates)))
+        out.decisions.append(decisions_of(what_became(window, window.order)))
         return state, out
 
     def _take(self, state: TrackerState, looks: Looks) -> Output:
@@ -153,7 +153,7 @@ class Tracker:
             state.window, self.plan, looks, self.length, keep_after, self._period, self.config.coast_after
         )
         self._write(state, rows, out)
-        if len(left.looks.row):
+        if len(left.row):
             out.decisions.append(decisions_of(left))
         return out
 

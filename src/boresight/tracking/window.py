@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,15 @@ from boresight.kernels.tracker_copies import (
     no_copies,
     tracks_with_room,
 )
-from boresight.kernels.tracker_looks import NO_SENSOR, Looks, chosen, joined, no_looks
+from boresight.kernels.tracker_looks import (
+    NO_SENSOR,
+    Looks,
+    chosen,
+    front,
+    places_of_looks,
+    put_behind,
+    room_for,
+)
 from boresight.kernels.tracker_rows import GAPS_KEPT, Clock, RowTable, row_table, rows_with_room
 from boresight.kernels.tracker_window import TAKEN, Fates, Queue, advance
 from boresight.tracking.core import Plan, copy_tracks
@@ -29,17 +37,22 @@ class Window:
 
     tracks: Tracks
     copies: Copies
-    looks: Looks  # in order of validity
+    looks: Looks  # with room behind them; also such as have left the window
     fates: Fates  # of these
     clock: Clock
+    order: IntArray  # (L,) places of the looks in the window, in order of validity
+    laid: int = 0  # looks that the tables hold
     arrivals: int = 0
 
 
 class Left(NamedTuple):
-    """Looks that have left the window, or never got in, and what became of them: final."""
+    """Detections of looks that have left the window, or never got in, and what became of them: final."""
 
-    looks: Looks
-    fates: Fates
+    row: IntArray  # (k,)
+    outcome: IntArray  # (k,) of the look
+    code: IntArray  # (k,)
+    owner: IntArray  # (k,)
+    nis: FloatArray  # (k,)
 
 
 def empty_window(plan: Plan) -> Window:
@@ -49,7 +62,7 @@ def empty_window(plan: Plan) -> Window:
     clock = Clock(
         np.array([-np.inf, -np.inf, 0.0]), np.full(n, -np.inf), np.zeros((n, GAPS_KEPT)), np.zeros(n, np.int64)
     )
-    return Window(tracks, no_copies(tracks), no_looks(), _fresh(no_looks()), clock)
+    return Window(tracks, no_copies(tracks), room_for(0, 0), _room_for_fates(0, 0), clock, np.zeros(0, np.int64))
 
 
 def take(
@@ -63,19 +76,18 @@ def take(
         period: (S,) s, of each sensor: NaN where it is to be found out, 0 for one that is not used.
         coast_after: time without a hit from which on a track coasts (s).
     """
-    held, new = len(window.looks.t), len(looks.t)
-    every = joined([window.looks, looks._replace(number=np.arange(window.arrivals, window.arrivals + new))])
-    window.arrivals += new
-    fates = Fates(*(np.concatenate(pair) for pair in zip(window.fates, _fresh(looks), strict=True)))
-    queue = Queue(np.arange(held + new), np.full(1, held), np.zeros(4, np.int64))
+    _lay(window, looks)
+    held, new, total = len(window.order), len(looks.t), window.laid
+    every, fates = front(window.looks, total), window.fates
+    queue = Queue(np.concatenate([window.order, np.zeros(new, np.int64)]), np.full(1, held), np.zeros(4, np.int64))
     rows = row_table(64 + 8 * int(window.tracks.live[0]), plan.settings.d)
-    done = held
+    done = total - new
     while True:
         done = advance(
             window.tracks, window.copies, plan.empty, plan.settings, plan.columns, every, fates, queue, done, length,
             window.clock, period, coast_after, rows, plan.extras,
         )  # fmt: skip
-        if done == held + new:
+        if done == total:
             break
         tracks, count, copied, written = (int(1.5 * n) + 16 for n in queue.wanted)
         window.tracks = tracks_with_room(window.tracks, tracks)
@@ -83,13 +95,25 @@ def take(
         rows = rows_with_room(rows, written)
     order = queue.order[: int(queue.length[0])]
     limit = _needed(window.copies, every, order, length, keep_after)
-    rejected = held + np.flatnonzero((fates.outcome[held:] != TAKEN) & (every.sensor[held:] != NO_SENSOR))
-    gone = np.concatenate([rejected, order[:limit]])
-    if not len(gone) and np.array_equal(order, np.arange(held + new)):  # all stay, in this order
-        window.looks, window.fates = every, fates
-        return rows, Left(*_NOTHING)
-    window.looks, window.fates = _part(every, fates, order[limit:])
-    return rows, Left(*(_part(every, fates, gone) if len(gone) else _NOTHING))
+    taken, sensor = fates.outcome[total - new : total] == TAKEN, every.sensor[total - new :]
+    rejected = total - new + np.flatnonzero(~taken & (sensor != NO_SENSOR))
+    window.order = order[limit:].copy()
+    return rows, what_became(window, np.concatenate([rejected, order[:limit]]))
+
+
+def what_became(window: Window, which: IntArray) -> Left:
+    """Return what became of the detections of the looks at places `which`."""
+    looks, fates = window.looks, window.fates
+    at, _, first = places_of_looks(looks, which)
+    outcome = np.repeat(fates.outcome[which], np.diff(first))
+    return Left(looks.row[at], outcome, fates.code[at], fates.owner[at], fates.nis[at])
+
+
+def held(window: Window) -> Window:
+    """Return the same window whose tables hold nothing but the looks in it, in order, and are its own."""
+    n = len(window.order)
+    looks, fates = _moved(window, n, int(np.diff(window.looks.first)[window.order].sum()))
+    return replace(window, looks=looks, fates=fates, order=np.arange(n), laid=n)
 
 
 def copies_of(window: Window, after: float) -> list[Tracks]:
@@ -112,14 +136,36 @@ def _needed(copies: Copies, looks: Looks, order: IntArray, length: float, keep_a
     return at
 
 
-def _fresh(looks: Looks) -> Fates:
-    m = len(looks.dt)
-    return Fates(np.zeros(len(looks.t), np.int64), np.zeros(m, np.int64), np.full(m, -1, np.int64), np.full(m, np.nan))
+def _lay(window: Window, looks: Looks) -> None:
+    """Put new looks behind those that are there; without room, make some and drop what has left the window."""
+    n, m = len(looks.t), len(looks.dt)
+    a = window.laid
+    b = int(window.looks.first[a])
+    if a + n > len(window.looks.t) or b + m > len(window.looks.dt):
+        a = len(window.order)
+        b = int(np.diff(window.looks.first)[window.order].sum())
+        window.looks, window.fates = _moved(window, 64 + 3 * (a + n) // 2, 64 + 3 * (b + m) // 2)
+        window.order = np.arange(a)
+    put_behind(window.looks, a, looks)
+    window.looks.number[a : a + n] = np.arange(window.arrivals, window.arrivals + n)
+    fates = window.fates
+    fates.outcome[a : a + n] = 0
+    fates.code[b : b + m], fates.owner[b : b + m], fates.nis[b : b + m] = 0, -1, np.nan
+    window.laid = a + n
+    window.arrivals += n
 
 
-def _part(looks: Looks, fates: Fates, which: IntArray) -> tuple[Looks, Fates]:
-    some, at = chosen(looks, which)
-    return some, Fates(fates.outcome[which], fates.code[at], fates.owner[at], fates.nis[at])
+def _moved(window: Window, looks: int, detections: int) -> tuple[Looks, Fates]:
+    """Return tables with room for so many, that begin with the looks in the window in order of validity."""
+    out, fates = room_for(looks, detections), _room_for_fates(looks, detections)
+    at = chosen(window.looks, window.order, out)
+    fates.outcome[: len(window.order)] = window.fates.outcome[window.order]
+    for new, old in zip(fates[1:], window.fates[1:], strict=True):
+        new[: len(at)] = old[at]
+    return out, fates
 
 
-_NOTHING = no_looks(), _fresh(no_looks())
+def _room_for_fates(looks: int, detections: int) -> Fates:
+    return Fates(
+        np.empty(looks, np.int64), np.empty(detections, np.int64), np.empty(detections, np.int64), np.empty(detections)
+    )
