@@ -20,7 +20,7 @@ def predict_all(tr: Tracks, s: Settings, t: float) -> None:
     """Predict every track to time `t`: state (exact white-acceleration CV), biases, hypotheses."""
     dt = t - tr.time[0]
     tr.time[0] = t
-    if dt <= 0.0:
+    if dt <= 0.0 or tr.live[0] == 0:
         return
     n = tr.x.shape[1]
     d = s.d
