@@ -277,6 +277,24 @@ def test_missing_files_and_folders(write: Write, tmp_path: Path) -> None:
         read_recording(folder)
 
 
+def test_a_file_that_may_not_be_read_is_not_called_damaged(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = write()
+
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Failed to open local file")
+
+    monkeypatch.setattr(pq, "ParquetFile", refuse)
+    with pytest.raises(UserError, match=r"detections\.parquet: cannot be read \(permission denied\)"):
+        read_recording(folder)
+
+
+def test_without_a_name_it_goes_by_its_folders(write: Write) -> None:
+    folder = write()
+    file = folder / "recording.toml"
+    file.write_text("\n".join(line for line in file.read_text().split("\n") if not line.startswith("name")))
+    assert read_recording(folder).name == folder.name
+
+
 def test_two_sets_of_positions_are_refused(write: Write) -> None:
     with pytest.raises(UserError, match="both kinds of position"):
         read_recording(write(put("platform", "latitude_deg", [1.0, 1.0])))

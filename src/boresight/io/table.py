@@ -100,6 +100,8 @@ def read_table(path: Path | str, schema: Mapping[str, str], required: Sequence[s
     read_bytes(path) if not path.is_file() or path.stat().st_size == 0 else None
     try:
         data = pq.ParquetFile(path).read()
+    except PermissionError:
+        raise UserError(f"{path}: cannot be read (permission denied)") from None
     except (pa.ArrowInvalid, pa.ArrowNotImplementedError, OSError, ValueError) as error:
         why = str(error).split("\n")[0].split(". ")[0]
         raise UserError(f"{path}: not a readable Parquet file (binary, truncated or damaged): {why}") from None
