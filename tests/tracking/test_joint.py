@@ -7,11 +7,13 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from boresight.association import jpda
 from boresight.io.scans import iter_scans
 from boresight.kernels.tracker import Look
-from boresight.kernels.tracker_joint import mix, shares
+from boresight.kernels.tracker_joint import mix, shares, take_shares
+from boresight.kernels.tracker_place import places_of
 from boresight.kernels.tracker_weigh import follow_blob
 from boresight.kernels.tracker_workroom import workroom
 from boresight.metrics.score import score
@@ -110,6 +112,37 @@ def test_the_mixture_is_that_of_probabilistic_data_association() -> None:
     P = A - beta.sum() * K @ S @ K.T + K @ spread @ K.T
     np.testing.assert_allclose(tr.x[0], x + K @ together, rtol=1e-9)
     np.testing.assert_allclose(tr.P[0], P, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("own", [1, -1])
+def test_shares_weigh_the_hypotheses_and_only_the_own_detection_counts(own: int) -> None:
+    plan = plan_of()
+    sensor = plan.sensors[0]
+    points, share, p_d = np.array([[1.0, 2.0], [-3.0, 0.5]]), np.array([0.7, 0.4]), 0.8
+    tr = empty_window(plan).tracks
+    tr.live[0] = 1
+    tr.x[0], tr.P[0] = (0.5, 0.0, 1.0, -1.0), np.diag([3.0, 4.0, 2.0, 2.0])
+    tr.weight[0] = before = np.array([0.4, 0.1, 0.3, 0.2])
+    anchor, A = np.array([0.2, 0.4]), np.diag([9.0, 6.0])
+    tr.anchor[0, :2], tr.anchor_P[0, :2, :2] = anchor, A
+    tr.life[0, 3] = 2.0
+    look, room = look_at(points)._replace(dt=np.array([0.0, 0.25])), workroom(4)
+    at = places_of(look, plan.settings, sensor, np.ones(2, np.bool_))
+    moving = [multivariate_normal.pdf(z, tr.x[0, :2], tr.P[0, :2, :2] + 4.0 * np.eye(2)) for z in points]
+    static = [multivariate_normal.pdf(z, anchor, A + 4.0 * np.eye(2)) for z in points]
+    start, column = np.array([0, 2]), np.array([0, 1])
+    take_shares(tr, 0, plan.settings, sensor, look, at, room, start, column, share, own, p_d, 1.0)
+    visible = 1.0 - p_d + share.sum()
+    still = 1.0 - p_d + share @ np.divide(static, moving)
+    after = before * [visible, 1.0, still, 1.0]
+    np.testing.assert_allclose(tr.weight[0], after / after.sum(), rtol=1e-9)
+    K = A @ np.linalg.inv(A + 4.0 * np.eye(2))
+    if own >= 0:
+        anchor, A = anchor + K @ (points[own] - anchor), A - K @ A
+    np.testing.assert_allclose(tr.anchor[0, :2], anchor, rtol=1e-9)
+    np.testing.assert_allclose(tr.anchor_P[0, :2, :2], A, rtol=1e-9, atol=1e-12)
+    assert tr.life[0].tolist() == ([0.0, 0.25, 0.0, 3.0] if own >= 0 else [0.0, 0.0, 0.0, 2.0])
+    assert tr.heard[0] == (1 if own >= 0 else 0)
 
 
 @pytest.mark.parametrize("word", ["jpda", "nearest"])
