@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boresight.kernels.tracker import INITIATED, UNASSOCIATED, Look, Tracks
+from boresight.kernels.tracker import INITIATED, NOTHING, UNASSOCIATED, Look, Tracks
 from boresight.kernels.tracker_copies import EACH, WHOLE, copies_with_room, keep, no_copies, restore
 from boresight.kernels.tracker_end import move
-from boresight.kernels.tracker_split import begin_beside
+from boresight.kernels.tracker_split import begin_beside, keep_beside
 from boresight.kernels.tracker_workroom import workroom
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.tracking.core import Plan, copy_tracks, make_plan
@@ -139,3 +139,17 @@ def test_nothing_is_left_of_the_track_that_had_the_row_before() -> None:
     (_, fresh, _), (_, used, _) = beside(), beside(stale=3.0)
     for name in EACH:
         np.testing.assert_array_equal(getattr(used, name)[1], getattr(fresh, name)[1], err_msg=name)
+
+
+@pytest.mark.parametrize(("shown", "away", "stays"), [(1.0, 18.0, True), (0.0, 18.0, False), (1.0, 40.0, False)])
+def test_a_second_track_ends_with_the_first_or_when_they_part(shown: float, away: float, stays: bool) -> None:
+    """Here the first track's blob is 25 m wide, and half as much again the farthest."""
+    plan, tracks, _ = beside()
+    tracks.life[0, 2] = shown
+    tracks.anchor[1, :2] = away, 0.0
+    free, usable = np.full(2, -1), np.ones(2, np.bool_)
+    tracks.x[0, :2] += 3.0
+    keep_beside(tracks, plan.settings, plan.sensors[1], bearings([0.0, 0.12]), free, usable, workroom(plan.n_states))
+    assert (tracks.weight[1, NOTHING] < 1.0) == stays
+    if stays:
+        np.testing.assert_allclose(tracks.x[1, :2], tracks.x[0, :2] + [away, 0.0])  # along with the first
