@@ -1,0 +1,192 @@
+"""Belief, showing and ending of tracks, one setting at a time, against what the formulas say."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from boresight.kernels.tracker import AZIMUTH_BINS, NOTHING, STATIC, VISIBLE
+from boresight.kernels.tracker_end import end_and_merge
+from boresight.tracking.config import SensorErrors, TrackerConfig
+from boresight.tracking.tracker import Tracker, TrackerState
+from boresight.types import FATES, Coverage, Fate, FloatArray, Scan, SensorKind
+from tests.tracking.test_rules import points, sensor
+
+P_RADAR, P_EYE = 0.8, 0.7
+FOR_EVER = {"survival_time": 1e12, "hide_time": 1e12}
+
+
+def tracker(errors: dict[str, SensorErrors] | None = None, **settings: Any) -> Tracker:
+    """A radar that sees 2 km, an eye that sees bearings; nothing changes between looks but by what they saw."""
+    radar = sensor(
+        "radar", coverage=Coverage(range=(0.0, 2000.0)), p_detection=P_RADAR, clutter_per_scan=2.0, period=2.0
+    )
+    eye = sensor("eye", SensorKind.OPTICAL, p_detection=P_EYE)
+    values = {"q": 0.1, "static_share": 0.0, "stop_floor": 0.0, **FOR_EVER, **settings}
+    return Tracker(TrackerConfig(sensors=errors or {}, **values), (radar, eye), 2)
+
+
+def after(used: Tracker, places: list[list[float]], looks: int = 6, t: float = 0.0) -> TrackerState:
+    """The state when the radar has reported the places (m) every two seconds, so many times."""
+    state = used.init()
+    for k in range(looks):
+        state, _ = used.step(state, points(t + 2.0 * k, places, first=100 * k))
+    return state
+
+
+def glance(t: float, azimuth: list[float]) -> Scan:
+    """One look of the eye."""
+    n = len(azimuth)
+    z, R = np.full((n, 7), np.nan), np.full((n, 7, 7), np.nan)
+    z[:, 1], R[:, 1, 1] = azimuth, 1e-4
+    return Scan(1, t, t, np.full(n, t), z, R, np.arange(9000, 9000 + n))
+
+
+def doubted(state: TrackerState) -> TrackerState:
+    """The same with a tenth of doubt about every track: where there is none, nothing can be read off."""
+    tr = state.window.tracks
+    tr.weight[: tr.live[0]] = 0.9, 0.0, 0.0, 0.1
+    return state
+
+
+def odds(state: TrackerState, i: int = 0) -> float:
+    w = state.window.tracks.weight[i]
+    return float(w[VISIBLE] / w[NOTHING])
+
+
+def test_looks_close_in_time_count_as_part_of_one() -> None:
+    used = tracker({"eye": SensorErrors(decorrelation=2.0)})
+    state = doubted(after(used, [[300.0, 400.0]]))
+    before = odds(state)
+    state, _ = used.step(state, glance(10.0, []))  # its first look counts in full
+    assert odds(state) == pytest.approx(before * (1.0 - P_EYE), rel=1e-6)
+    state, _ = used.step(state, glance(10.5, []))  # a quarter of the two seconds
+    assert odds(state) == pytest.approx(before * (1.0 - P_EYE) ** 1.25, rel=1e-6)
+
+
+def test_detection_probability_falls_to_half_at_the_fade_range() -> None:
+    used = tracker({"radar": SensorErrors(fade_range=500.0)})
+    state = doubted(after(used, [[300.0, 400.0]]))
+    before = odds(state)
+    state, _ = used.step(state, points(10.0, []))
+    r = np.hypot(*state.window.tracks.x[0, :2])
+    assert odds(state) == pytest.approx(before * (1.0 - P_RADAR / (1.0 + (r / 500.0) ** 4)), rel=1e-6)
+    assert r == pytest.approx(500.0, abs=1.0)
+
+
+def test_a_sensor_that_moves_no_tracks_is_evidence_alone() -> None:
+    used = tracker({"eye": SensorErrors(moves_tracks=False)})
+    state = doubted(after(used, [[300.0, 400.0]]))
+    x, P, before = state.window.tracks.x[0].copy(), state.window.tracks.P[0].copy(), odds(state)
+    state, _ = used.step(state, glance(10.0, [np.arctan2(300.0, 400.0) + 0.005]))
+    np.testing.assert_array_equal(state.window.tracks.x[0], x)
+    np.testing.assert_array_equal(state.window.tracks.P[0], P)
+    assert odds(state) > before
+
+
+@pytest.mark.parametrize(("lonely", "fate"), [(True, Fate.UNASSOCIATED), (False, Fate.UPDATED)])
+def test_a_bearing_that_two_tracks_could_claim_is_nobodys(lonely: bool, fate: Fate) -> None:
+    used = tracker(lonely_bearings=lonely)
+    state = doubted(after(used, [[300.0, 400.0], [600.0, 800.0]]))
+    before = odds(state, 0), odds(state, 1)
+    state, _ = used.step(state, glance(10.0, [np.arctan2(3.0, 4.0)]))
+    _, out = used.finish(state)
+    found = {int(r): FATES[f] for d in out.decisions for r, f in zip(d.row, d.fate, strict=True)}
+    assert found[9000] == fate
+    assert ((odds(state, 0), odds(state, 1)) == before) == lonely
+
+
+@pytest.mark.parametrize(("apart", "shown"), [(0.0, 2), (60.0, 1)])
+def test_nothing_comes_up_beside_a_shown_track(apart: float, shown: int) -> None:
+    state = after(tracker(apart=apart, merge_distance=1.0), [[300.0, 400.0], [340.0, 400.0]], looks=12)
+    assert state.window.tracks.live[0] == 2
+    assert state.window.tracks.life[:2, 2].sum() == shown
+
+
+def test_a_track_is_shown_within_the_report_range_and_a_tenth_beyond() -> None:
+    used = tracker({"radar": SensorErrors(report_range=500.0)})
+    state, shown = used.init(), {}
+    for k in range(25):
+        north = 400.0 + 10.0 * k
+        state, _ = used.step(state, points(2.0 * k, [[0.0, north], [0.0, 800.0 + 10.0 * k]], first=100 * k))
+        tr = state.window.tracks
+        near = int(np.argmin(np.abs(tr.x[: tr.live[0], 1] - north)))
+        shown[north] = bool(tr.life[near, 2])
+        assert tr.life[: tr.live[0], 2].sum() == shown[north]  # never the one beyond
+    assert shown[490.0]
+    assert shown[530.0]
+    assert not shown[570.0]
+
+
+@pytest.mark.parametrize(("speed", "left"), [(0.0, 1), (60.0, 2)])
+def test_two_that_have_become_one_are_merged_unless_they_cross(speed: float, left: int) -> None:
+    used = tracker(merge_distance=30.0)
+    state = after(used, [[300.0, 400.0], [700.0, 400.0]])
+    tr = state.window.tracks
+    tr.x[1, :2], tr.x[1, 2] = tr.x[0, :2] + 10.0, tr.x[0, 2] + speed
+    tr.weight[1] = tr.weight[0]
+    elder = tr.birth[0]
+    state, _ = used.step(state, points(10.0, []))
+    assert state.window.tracks.live[0] == left
+    assert state.window.tracks.birth[0] == elder
+
+
+def test_a_first_look_full_of_targets_is_taken_at_their_number() -> None:
+    used = tracker(targets_at_start=1.0, birth_rate=0.25)
+    state, _ = used.step(used.init(), points(0.0, [[100.0 + 50.0 * k, 300.0] for k in range(20)]))
+    tr = state.window.tracks
+    clutter = tr.clutter[0, AZIMUTH_BINS]
+    expected = P_RADAR * (20.0 - clutter)
+    np.testing.assert_allclose(tr.weight[:20, VISIBLE], expected / (expected + clutter))
+    assert tr.undetected[0] == pytest.approx((20.0 - clutter) * (1.0 - P_RADAR) + 0.25)
+
+
+def test_a_target_that_moved_may_stop_where_it_is() -> None:
+    used = tracker(stop_floor=0.05)
+    state = after(used, [[300.0, 400.0]])
+    tr = state.window.tracks
+    tr.weight[0], tr.anchor[0, :2] = (0.9, 0.0, 0.0, 0.1), 0.0
+    state, _ = used.step(state, points(10.0, [[302.0, 401.0]], first=900))
+    w = tr.weight[0]
+    assert w[STATIC] == pytest.approx(0.05 * (w[VISIBLE] + w[STATIC]))
+    np.testing.assert_array_equal(tr.anchor[0, :2], tr.x[0, :2])
+    np.testing.assert_array_equal(tr.anchor_P[0, :2, :2], tr.P[0, :2, :2])
+
+
+def test_rows_ahead_are_exact_predictions() -> None:
+    used = tracker()
+    state = after(used, [[300.0, 400.0]])
+    x, P = state.window.tracks.x[0].copy(), state.window.tracks.P[0].copy()
+    _, out = used.step(state, points(12.0, [[300.0, 400.0]], first=900))
+    ahead = {
+        round(float(t), 6): (p, C) for r in out.rows for t, p, C in zip(r.t, r.position, r.covariance, strict=True)
+    }
+    assert list(ahead) == [10.0, 10.4, 10.8, 11.2, 11.6]
+    for t, (p, C) in ahead.items():
+        dt = t - 10.0
+        F = np.eye(4) + dt * np.eye(4, k=2)
+        Q = 0.1 * dt**3 / 3.0 * np.eye(2)
+        np.testing.assert_allclose(p, (F @ x)[:2], rtol=1e-12)
+        np.testing.assert_allclose(C, (F @ P @ F.T)[:2, :2] + Q, rtol=1e-9)
+
+
+def covariance_of(place: FloatArray) -> FloatArray:
+    """Return that of a lone report at the time of the look."""
+    used = tracker()
+    state, _ = used.step(used.init(), points(0.0, [list(place)]))
+    return state.window.tracks.P[0]
+
+
+def test_a_track_begins_with_the_reports_covariance_and_the_prior_speed() -> None:
+    np.testing.assert_allclose(covariance_of(np.array([300.0, 400.0])), np.diag([25.0, 25.0, 64.0, 64.0]))
+
+
+@pytest.mark.parametrize(("crowd", "left"), [(0, 1), (2, 1), (3, 0)])
+def test_where_many_detections_are_in_the_gate_a_track_needs_more_to_live(crowd: int, left: int) -> None:
+    used = tracker(delete_below=0.01)
+    tr = after(used, [[300.0, 400.0]]).window.tracks
+    tr.weight[0] = 0.025, 0.0, 0.0, 0.975
+    end_and_merge(tr, used.plan.settings, False, np.array([0, crowd]), None)
+    assert tr.live[0] == left
