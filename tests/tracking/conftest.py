@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from numba import njit
 
 from boresight.types import (
     Axes,
@@ -18,6 +21,11 @@ from boresight.types import (
 )
 
 NAN = float("nan")
+
+
+def whole(part: Any) -> Any:
+    """Return a part of a kernel so that it can be called from here."""
+    return njit(getattr(part, "py_func", part))
 
 
 def _sensor(name: str, kind: SensorKind, sigma: dict[int, float], **extra: object) -> Sensor:

@@ -11,8 +11,11 @@ from boresight.tracking.config import TrackerConfig
 from boresight.tracking.core import make_plan
 from boresight.tracking.window import empty_window
 from boresight.types import Coverage, SensorKind
+from tests.tracking.conftest import whole
 from tests.tracking.test_rules import bearings, sensor
 
+CLUTTER_DENSITY = whole(clutter_density)
+LEARN_CLUTTER = whole(learn_clutter)
 MEMORY = 30.0
 PLAN = make_plan(
     TrackerConfig(clutter_memory=MEMORY),
@@ -35,7 +38,7 @@ def test_false_bearings_are_learned_where_they_come_from() -> None:
     tracks = empty_window(PLAN).tracks
     look = bearings([1.0, 1.01, -2.0])
     for _ in range(50):
-        learn_clutter(tracks, PLAN.settings, PLAN.sensors[0], look, NONE, FREE, ALL)
+        LEARN_CLUTTER(tracks, PLAN.settings, PLAN.sensors[0], look, NONE, FREE, ALL)
     left = (1.0 - 1.0 / MEMORY) ** 50  # of what was declared; the rest is the mean of the looks
     known = tracks.clutter[0]
     assert known[AZIMUTH_BINS] == pytest.approx(3.0 * (1.0 - left) + 1.2 * left)
@@ -51,7 +54,7 @@ def test_what_may_be_a_target_is_no_false_detection() -> None:
     tracks.live[0] = 1
     tracks.weight[0] = 0.5, 0.1, 0.1, 0.3
     claims, taken = np.array([1, 1, 0]), np.array([0, -1, -1])
-    learn_clutter(tracks, PLAN.settings, PLAN.sensors[0], bearings([1.0, 2.0, -2.0]), claims, taken, ALL)
+    LEARN_CLUTTER(tracks, PLAN.settings, PLAN.sensors[0], bearings([1.0, 2.0, -2.0]), claims, taken, ALL)
     before = 1.2 / AZIMUTH_BINS * (1.0 - 1.0 / MEMORY)
     learned = MEMORY * (tracks.clutter[0, [place(1.0), place(2.0), place(-2.0)]] - before)
     np.testing.assert_allclose(learned, [0.3, 0.0, 1.0], atol=1e-12)
@@ -62,7 +65,7 @@ def test_the_density_is_the_number_over_the_coverage() -> None:
     z = np.full(7, np.nan)
     for azimuth in (-3.1, 0.0, 3.1):
         z[1] = azimuth
-        per_rad = clutter_density(tracks, PLAN.settings, PLAN.sensors[0], z, np.array([1]), 1)
+        per_rad = CLUTTER_DENSITY(tracks, PLAN.settings, PLAN.sensors[0], z, np.array([1]), 1)
         assert per_rad == pytest.approx(1.2 / (2.0 * np.pi))
-    per_m2 = clutter_density(tracks, PLAN.settings, PLAN.sensors[1], z, np.array([4, 5]), 2)
+    per_m2 = CLUTTER_DENSITY(tracks, PLAN.settings, PLAN.sensors[1], z, np.array([4, 5]), 2)
     assert per_m2 == pytest.approx(6.0 / (0.5 * (500.0**2 - 100.0**2) * 1.5))

@@ -32,10 +32,13 @@ from boresight.types import (
     Site,
     Truth,
 )
-from tests.tracking.conftest import make_recording
+from tests.tracking.conftest import make_recording, whole
 
 NAN = float("nan")
 EYE = np.eye(3)
+
+TAKE_SHARES = whole(take_shares)
+PLACES_OF = whole(places_of)
 
 
 def point_sensor() -> Sensor:
@@ -127,11 +130,11 @@ def test_shares_weigh_the_hypotheses_and_only_the_own_detection_counts(own: int)
     tr.anchor[0, :2], tr.anchor_P[0, :2, :2] = anchor, A
     tr.life[0, 3] = 2.0
     look, room = look_at(points)._replace(dt=np.array([0.0, 0.25])), workroom(4)
-    at = places_of(look, plan.settings, sensor, np.ones(2, np.bool_))
+    at = PLACES_OF(look, plan.settings, sensor, np.ones(2, np.bool_))
     moving = [multivariate_normal.pdf(z, tr.x[0, :2], tr.P[0, :2, :2] + 4.0 * np.eye(2)) for z in points]
     static = [multivariate_normal.pdf(z, anchor, A + 4.0 * np.eye(2)) for z in points]
     start, column = np.array([0, 2]), np.array([0, 1])
-    take_shares(tr, 0, plan.settings, sensor, look, at, room, start, column, share, own, p_d, 1.0)
+    TAKE_SHARES(tr, 0, plan.settings, sensor, look, at, room, start, column, share, own, p_d, 1.0)
     visible = 1.0 - p_d + share.sum()
     still = 1.0 - p_d + share @ np.divide(static, moving)
     after = before * [visible, 1.0, still, 1.0]

@@ -12,10 +12,13 @@ from boresight.kernels.tracker_end import end_and_merge
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.tracking.tracker import Tracker, TrackerState
 from boresight.types import FATES, Coverage, Fate, FloatArray, Scan, SensorKind
+from tests.tracking.conftest import whole
 from tests.tracking.test_rules import points, sensor
 
 P_RADAR, P_EYE = 0.8, 0.7
 FOR_EVER = {"survival_time": 1e12, "hide_time": 1e12}
+
+END_AND_MERGE = whole(end_and_merge)
 
 
 def tracker(errors: dict[str, SensorErrors] | None = None, **settings: Any) -> Tracker:
@@ -188,5 +191,5 @@ def test_where_many_detections_are_in_the_gate_a_track_needs_more_to_live(crowd:
     used = tracker(delete_below=0.01)
     tr = after(used, [[300.0, 400.0]]).window.tracks
     tr.weight[0] = 0.025, 0.0, 0.0, 0.975
-    end_and_merge(tr, used.plan.settings, False, np.array([0, crowd]), None)
+    END_AND_MERGE(tr, used.plan.settings, False, np.array([0, crowd]), None)
     assert tr.live[0] == left

@@ -17,8 +17,15 @@ from boresight.tracking.core import Plan, copy_tracks, make_plan
 from boresight.tracking.tracker import Tracker
 from boresight.tracking.window import empty_window
 from boresight.types import Coverage, Scan, Sensor, SensorKind
+from tests.tracking.conftest import whole
 
 NAN = float("nan")
+
+KEEP = whole(keep)
+RESTORE = whole(restore)
+MOVE = whole(move)
+BEGIN_BESIDE = whole(begin_beside)
+KEEP_BESIDE = whole(keep_beside)
 
 
 def sensor(name: str, kind: SensorKind = SensorKind.RADAR, **extra: Any) -> Sensor:
@@ -66,8 +73,8 @@ def test_a_copy_holds_all_there_is_of_the_tracks() -> None:
     tracks, other = filled(1, 3), filled(2, 5)
     expected = copy_tracks(tracks)
     copies = copies_with_room(no_copies(tracks), 2, 10)
-    keep(copies, tracks, 7.0, 4)
-    restore(copies, 0, other)
+    KEEP(copies, tracks, 7.0, 4)
+    RESTORE(copies, 0, other)
     for name in WHOLE:
         np.testing.assert_array_equal(getattr(other, name), getattr(expected, name), err_msg=name)
     for name in EACH:
@@ -78,7 +85,7 @@ def test_a_copy_holds_all_there_is_of_the_tracks() -> None:
 def test_a_track_moves_with_all_that_it_is() -> None:
     tracks = filled(3, 4)
     expected = copy_tracks(tracks)
-    move(tracks, 3, 1)
+    MOVE(tracks, 3, 1)
     for name in EACH:
         np.testing.assert_array_equal(getattr(tracks, name)[1], getattr(expected, name)[3], err_msg=name)
 
@@ -110,7 +117,7 @@ def beside(stale: float = 0.0, azimuth: float = 0.12) -> tuple[Plan, Tracks, lis
         getattr(tracks, name)[1] = stale
     fate, owner = np.full(2, UNASSOCIATED), np.full(2, -1)
     look, usable = bearings([0.0, azimuth]), np.ones(2, np.bool_)
-    begin_beside(tracks, plan.settings, plan.sensors[1], look, fate, owner, usable, workroom(n))
+    BEGIN_BESIDE(tracks, plan.settings, plan.sensors[1], look, fate, owner, usable, workroom(n))
     return plan, tracks, fate.tolist()
 
 
@@ -149,7 +156,7 @@ def test_a_second_track_ends_with_the_first_or_when_they_part(shown: float, away
     tracks.anchor[1, :2] = away, 0.0
     free, usable = np.full(2, -1), np.ones(2, np.bool_)
     tracks.x[0, :2] += 3.0
-    keep_beside(tracks, plan.settings, plan.sensors[1], bearings([0.0, 0.12]), free, usable, workroom(plan.n_states))
+    KEEP_BESIDE(tracks, plan.settings, plan.sensors[1], bearings([0.0, 0.12]), free, usable, workroom(plan.n_states))
     assert (tracks.weight[1, NOTHING] < 1.0) == stays
     if stays:
         np.testing.assert_allclose(tracks.x[1, :2], tracks.x[0, :2] + [away, 0.0])  # along with the first
