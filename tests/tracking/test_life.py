@@ -11,7 +11,7 @@ from boresight.kernels.tracker import AZIMUTH_BINS, NOTHING, STATIC, VISIBLE
 from boresight.kernels.tracker_end import end_and_merge
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.tracking.tracker import Tracker, TrackerState
-from boresight.types import FATES, Coverage, Fate, FloatArray, Scan, SensorKind
+from boresight.types import FATES, Coverage, Fate, FloatArray, Scan, Sensor, SensorKind
 from tests.tracking.conftest import whole
 from tests.tracking.test_rules import points, sensor
 
@@ -193,3 +193,30 @@ def test_where_many_detections_are_in_the_gate_a_track_needs_more_to_live(crowd:
     tr.weight[0] = 0.025, 0.0, 0.0, 0.975
     END_AND_MERGE(tr, used.plan.settings, False, np.array([0, crowd]), None)
     assert tr.live[0] == left
+
+
+def test_a_first_range_rate_tells_of_the_velocity_along_the_line_of_sight() -> None:
+    sigma = np.full(7, np.nan)
+    sigma[[0, 1, 3]] = 5.0, 0.01, 2.0
+    doppler = Sensor("doppler", SensorKind.RADAR, sigma=sigma, coverage=Coverage(range=(0.0, 2000.0)))
+    used = Tracker(TrackerConfig(), (doppler,), 2)
+    z, R = np.full((1, 7), np.nan), np.full((1, 7, 7), np.nan)
+    z[0, :2], z[0, 3] = (500.0, np.arctan2(3.0, 4.0)), -6.0
+    for a, b in ((0, 0), (1, 1), (3, 3)):
+        R[0, a, b] = sigma[a] ** 2
+    state, _ = used.step(used.init(), Scan(0, 0.0, 0.0, np.zeros(1), z, R, np.arange(1)))
+    u, gain = np.array([0.6, 0.8]), 64.0 / (64.0 + 4.0)  # prior speed 8 m/s
+    tr = state.window.tracks
+    np.testing.assert_allclose(tr.x[0, 2:4], -6.0 * gain * u, rtol=1e-9)
+    np.testing.assert_allclose(tr.P[0, 2:4, 2:4], 64.0 * (np.eye(2) - gain * np.outer(u, u)), rtol=1e-9)
+
+
+def test_rows_come_until_a_look_is_expected_and_again_where_it_is_late() -> None:
+    """Without a declared period the median of the last intervals stands for it: here 1 s, the newest being 3 s."""
+    radar = sensor("radar", coverage=Coverage(range=(0.0, 2000.0)), clutter_per_scan=2.0)
+    used = Tracker(TrackerConfig(static_share=0.0, stop_floor=0.0), (radar,), 2)
+    state, rows = used.init(), []
+    for k, t in enumerate([0.0, 1.0, 2.0, 3.0, 6.0, 8.0]):
+        state, out = used.step(state, points(t, [[300.0, 400.0]], first=k))
+        rows = [(round(float(a), 6), round(float(b), 6)) for r in out.rows for a, b in zip(r.t, r.t_known, strict=True)]
+    assert rows == [(6.0, 6.0), (6.4, 6.0), (6.8, 6.0), (7.2, 7.2), (7.6, 7.6)]
