@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, multivariate_normal
 
+from boresight.io.scans import iter_scans
 from boresight.kernels.tracker import AZIMUTH_BINS, HIDDEN, NOTHING, VISIBLE
 from boresight.tracking.config import TrackerConfig
+from boresight.tracking.run import decision_rows, run, tracker_for
 from boresight.tracking.tracker import Tracker, TrackerState
-from boresight.types import FATES, Coverage, Fate, FloatArray, Scan, SensorKind
+from boresight.types import FATES, NO_TRACK, Coverage, Fate, FloatArray, Recording, Scan, SensorKind
 from tests.tracking.test_rules import points, sensor
 
 RANGE = 2000.0
@@ -88,3 +90,18 @@ def test_every_detection_in_the_gate_speaks_for_the_track(near: list[list[float]
     np.testing.assert_allclose(after, expected / expected.sum(), rtol=1e-6)
     assert after[HIDDEN] > 0.0
     assert after[NOTHING] > 0.0
+
+
+def test_every_row_says_why(harbour: Recording) -> None:
+    """Empty looks saw nothing; a track that was never shown has no number, and its reports say so."""
+    used = tracker_for(harbour, TrackerConfig())
+    state, _, decisions = run(used, iter_scans(harbour))
+    found = decision_rows(harbour, used, decisions, state.names)
+    empty = np.isnan(harbour.detections.z).all(axis=1)
+    assert empty.any()
+    np.testing.assert_array_equal(found.fate == FATES.index(Fate.NO_DETECTION), empty)
+    taken = np.isin(found.fate, [FATES.index(Fate.UPDATED), FATES.index(Fate.INITIATED)])
+    unnamed = taken & (found.track_id == NO_TRACK)
+    assert unnamed.any()
+    assert set(found.reason[unnamed]) == {"the track was never confirmed"}
+    assert set(found.reason[taken & ~unnamed]) == {None}
