@@ -69,3 +69,16 @@ def test_the_density_is_the_number_over_the_coverage() -> None:
         assert per_rad == pytest.approx(1.2 / (2.0 * np.pi))
     per_m2 = CLUTTER_DENSITY(tracks, PLAN.settings, PLAN.sensors[1], z, np.array([4, 5]), 2)
     assert per_m2 == pytest.approx(6.0 / (0.5 * (500.0**2 - 100.0**2) * 1.5))
+
+
+def test_a_coverage_without_end_is_as_wide_as_twice_what_was_seen() -> None:
+    """And at least what a target at the prior speed of 8 m/s covers in 100 s."""
+    plan = make_plan(TrackerConfig(), (sensor("radar", clutter_per_scan=6.0),), 2)
+    tracks, look = empty_window(plan).tracks, bearings([1.0, 2.0, 3.0])
+    mask, z = np.array([4, 5]), np.full(7, np.nan)
+    first = CLUTTER_DENSITY(tracks, plan.settings, plan.sensors[0], z, mask, 2)
+    assert first == pytest.approx(6.0 / (np.pi * 800.0**2))
+    look.z[1, 4:6] = 3000.0, -4000.0
+    LEARN_CLUTTER(tracks, plan.settings, plan.sensors[0], look, NONE, FREE, ALL)
+    then = CLUTTER_DENSITY(tracks, plan.settings, plan.sensors[0], z, mask, 2)
+    assert then == pytest.approx(tracks.clutter[0, AZIMUTH_BINS] / (np.pi * 10_000.0**2))

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.stats import chi2, multivariate_normal
 
 from boresight.io.scans import iter_scans
 from boresight.kernels.tracker import AZIMUTH_BINS, HIDDEN, NOTHING, VISIBLE
+from boresight.kernels.tracker_state import innovation
+from boresight.kernels.tracker_workroom import workroom
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.run import decision_rows, run, tracker_for
 from boresight.tracking.tracker import Tracker, TrackerState
 from boresight.types import FATES, NO_TRACK, Coverage, Fate, FloatArray, Recording, Scan, SensorKind
+from tests.tracking.conftest import whole
 from tests.tracking.test_rules import points, sensor
 
+INNOVATION = whole(innovation)
 RANGE = 2000.0
 TRACKER = Tracker(
     TrackerConfig(q=0.1, static_share=0.0, stop_floor=0.0, gate_probability=0.99, lonely_bearings=False),
@@ -72,6 +78,35 @@ def test_bearings_are_told_with_the_track_they_were_held_against() -> None:
     found = told(state)
     assert found[3] == (Fate.UPDATED, 0, pytest.approx(0.98 * gate))
     assert found[4] == (Fate.GATED, 0, pytest.approx(1.02 * gate))
+
+
+def test_a_detection_is_held_against_the_track_at_its_own_time() -> None:
+    """A radar that turns sees it a quarter of a second after the middle of its look."""
+    state, x, P = tracked()
+    H = np.eye(2, 4) + 0.25 * np.eye(2, 4, k=2)
+    y, S = np.array([8.0, -6.0]), H @ P @ H.T + 25.0 * np.eye(2)
+    look = points(2.0, [list(H @ x + y)], first=3)
+    state, _ = TRACKER.step(state, dataclasses.replace(look, t=look.t + 0.25))
+    assert told(state)[3] == (Fate.UPDATED, 0, pytest.approx(y @ np.linalg.solve(S, y)))
+    np.testing.assert_allclose(state.window.tracks.x[0], x + P @ H.T @ np.linalg.solve(S, y), rtol=1e-9)
+
+
+def test_a_time_offset_times_a_velocity_both_uncertain() -> None:
+    """Moments of the product of two Gaussians, by drawing them: z = p - lag v + noise."""
+    rng = np.random.default_rng(7)
+    mean = np.array([10.0, -20.0, 3.0, -4.0, 0.5])
+    A = rng.normal(size=(5, 5)) * [1.0, 1.0, 1.0, 1.0, 0.4]
+    P = A.T @ A
+    p, v, lag = np.split(rng.multivariate_normal(mean, P, 400_000), [2, 4], axis=1)
+    drawn = p - lag * v
+    z, R, room = np.full(7, np.nan), np.full((7, 7), np.nan), workroom(5)
+    z[4:6], R[4:6, 4:6] = (1.0, 2.0), 0.25 * np.eye(2)
+    room.mask[:2], room.z[4:6] = (4, 5), mean[:2] - mean[4] * mean[2:4]
+    room.H[4:6] = np.column_stack([np.eye(2), -mean[4] * np.eye(2), -mean[2:4]])
+    INNOVATION(P, z, R, 2, room, 2, 4)
+    L = np.tril(room.S[:2, :2])
+    np.testing.assert_allclose(L @ room.y[:2], z[4:6] - drawn.mean(axis=0), atol=4.0 * drawn.std() / 400_000**0.5)
+    np.testing.assert_allclose(L @ L.T, np.cov(drawn.T) + 0.25 * np.eye(2), rtol=0.02, atol=0.05)
 
 
 @pytest.mark.parametrize("near", [[[4.0, 3.0]], [[4.0, 3.0], [-6.0, 8.0]], []])

@@ -158,6 +158,14 @@ def test_a_target_that_moved_may_stop_where_it_is() -> None:
     np.testing.assert_array_equal(tr.anchor_P[0, :2, :2], tr.P[0, :2, :2])
 
 
+def test_what_does_not_move_may_still_wander() -> None:
+    used = tracker(static_q=0.5)
+    state = after(used, [[300.0, 400.0]])
+    before = state.window.tracks.anchor_P[0, :2, :2].copy()
+    state, _ = used.step(state, glance(14.0, []))
+    np.testing.assert_allclose(state.window.tracks.anchor_P[0, :2, :2], before + 0.5 * 4.0 * np.eye(2))
+
+
 def test_rows_ahead_are_exact_predictions() -> None:
     used = tracker()
     state = after(used, [[300.0, 400.0]])
