@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from boresight.kernels.tracker import AZIMUTH_BINS, NOTHING, STATIC, VISIBLE
 from boresight.kernels.tracker_end import end_and_merge
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.tracking.tracker import Tracker, TrackerState
-from boresight.types import FATES, Coverage, Fate, FloatArray, Scan, Sensor, SensorKind
+from boresight.types import FATES, Coverage, Fate, Scan, Sensor, SensorKind
 from tests.tracking.conftest import whole
 from tests.tracking.test_rules import points, sensor
 
@@ -183,15 +184,24 @@ def test_rows_ahead_are_exact_predictions() -> None:
         np.testing.assert_allclose(C, (F @ P @ F.T)[:2, :2] + Q, rtol=1e-9)
 
 
-def covariance_of(place: FloatArray) -> FloatArray:
-    """Return that of a lone report at the time of the look."""
-    used = tracker()
-    state, _ = used.step(used.init(), points(0.0, [list(place)]))
-    return state.window.tracks.P[0]
-
-
 def test_a_track_begins_with_the_reports_covariance_and_the_prior_speed() -> None:
-    np.testing.assert_allclose(covariance_of(np.array([300.0, 400.0])), np.diag([25.0, 25.0, 64.0, 64.0]))
+    """The report is of a quarter of a second after the look, and off by a bias: x = z - b - v dt."""
+    used = tracker({"radar": SensorErrors(bias_position=2.0)})
+    look = points(0.0, [[300.0, 400.0]])
+    state, _ = used.step(used.init(), dataclasses.replace(look, t=look.t + 0.25))
+    x = np.hstack([-0.25 * np.eye(2), -np.eye(2)])  # by velocity and bias
+    rest = np.diag([64.0, 64.0, 4.0, 4.0])
+    P = np.block([[x @ rest @ x.T + 25.0 * np.eye(2), x @ rest], [rest @ x.T, rest]])
+    np.testing.assert_allclose(state.window.tracks.P[0], P)
+    np.testing.assert_array_equal(state.window.tracks.x[0], [300.0, 400.0, 0.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_a_share_of_what_is_new_does_not_move(share: float) -> None:
+    used = tracker(static_share=share)
+    state, _ = used.step(used.init(), points(0.0, [[300.0, 400.0]]))
+    w = state.window.tracks.weight[0]
+    assert w[STATIC] == pytest.approx(share * (w[STATIC] + w[VISIBLE]))
 
 
 @pytest.mark.parametrize(("crowd", "left"), [(0, 1), (2, 1), (3, 0)])
