@@ -13,9 +13,11 @@ from boresight.cli.output import print_json, print_table
 from boresight.io.files import output_folder
 from boresight.io.recording import write_recording
 from boresight.io.results import write_results
+from boresight.tracking.cache import compiling_beside
 from boresight.types import Results
 
 SET = "P"
+DIMENSIONS = 3  # of the scenario
 COLUMNS = {
     "time_s": "time\ns",
     "radar_rmse_m": "radar alone\nerror m",
@@ -59,8 +61,11 @@ def demo(
 
         raise UserError("--runs must be 2 or more, --seed 0 or more")
     with output_folder(output, force) as folder:
-        _say(json, f"comparing the filter with the bound over {runs} runs …")
-        rows = _table(runs, seed)
+        with compiling_beside(DIMENSIONS) as compiles:
+            if compiles:
+                _say(json, "compiling kernels beside, on the first run only (about a minute) …")
+            _say(json, f"comparing the filter with the bound over {runs} runs …")
+            rows = _table(runs, seed)
         results = _tracked(folder, output, seed, rows)
     report = output / "report.html"
     if json:

@@ -26,6 +26,7 @@ from boresight.kernels.guide import (
     predict,
 )  # fmt: skip
 from boresight.kernels.options import PART
+from boresight.kernels.write import write_vector
 from boresight.types.sensor import FloatArray
 
 LOG_TURN = math.log(2.0 * math.pi)
@@ -184,8 +185,8 @@ def start(
     X[:] = 0.0
     P[:] = 0.0
     for h in range(len(X)):
-        X[h, :3] = position
-        X[h, 3:6] = velocity
+        write_vector(X[h], position)
+        write_vector(X[h, 3:], velocity)
         for i in range(m):
             P[h, i, i] = spread[i // 3] ** 2
         for i in range(m, m + 3):
@@ -196,7 +197,7 @@ def start(
 def report_position(kind: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray, out: FloatArray) -> bool:
     """Fill `out` (3,) with the report's position in ECEF; false if it has no range."""
     if kind != DIRECTION:
-        out[:] = z[:3]
+        write_vector(out, z[:3])
         return True
     if math.isnan(z[2]):
         return False

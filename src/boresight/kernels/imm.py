@@ -18,6 +18,7 @@ from boresight.kernels.gaussian import joseph_update, sandwich
 from boresight.kernels.observation import IntArray
 from boresight.kernels.options import PART
 from boresight.kernels.signatures import MATRIX, MOTION, OBSERVATION, STACK, VECTOR
+from boresight.kernels.write import write_matrix, write_vector
 from boresight.types.sensor import FloatArray
 
 NEGLIGIBLE = 1e-15  # share of a model in the mixture of another
@@ -276,11 +277,11 @@ def imm_stream(
                 )
                 if np.isnan(log_likelihoods[j]):
                     return k
-            X[j, :n] = mean
-            P[j, :n, :n] = covariance
+            write_vector(X[j], mean)
+            write_matrix(P[j], covariance)
         weights = reweigh(weights, log_likelihoods)
         x_out[k], P_out[k] = combine(weights, X, P, n_out)
-        weights_out[k] = weights
+        write_vector(weights_out[k], weights)
         if X_kept.shape[0] > 0:
             X_kept[k], P_kept[k] = X, P
         if memory > 0.0:

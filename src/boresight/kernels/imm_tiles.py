@@ -17,6 +17,7 @@ from boresight.kernels.blocks import ROWS, Belief, Nine, Six, Three, load, store
 from boresight.kernels.observation import IntArray
 from boresight.kernels.signatures import MATRIX, STACK, VECTOR
 from boresight.kernels.tiles import DET, NIS, SCORE, SEEN, WIDTH, WORK, aligned, move_tile, report_tile
+from boresight.kernels.write import write_vector
 from boresight.types.sensor import FloatArray
 
 LEAST = 1e-12  # weight below which no model falls, as in kernels.imm.reweigh
@@ -117,7 +118,9 @@ def run_imm_tiles(
     )
     size = ROWS * WIDTH
     for i in range(tiles.shape[0]):
-        b[:size], other[:size], weight[:] = tiles[i, :size], tiles[i, size : 2 * size], tiles[i, 2 * size :]
+        write_vector(b, tiles[i, :size])
+        write_vector(other, tiles[i, size : 2 * size])
+        write_vector(weight, tiles[i, 2 * size :])
         b[NIS * WIDTH :] = 0.0
         other[NIS * WIDTH :] = 0.0
         now = t0
@@ -132,8 +135,10 @@ def run_imm_tiles(
             move_tile(other, dt, q[1])
             report_tile(other, seen, z[i, k], context)
             weigh_tile(b, other, weight)
-        tiles[i, :size], tiles[i, size : 2 * size], tiles[i, 2 * size :] = b[:size], other[:size], weight
-        score[i] = b[SCORE * WIDTH :]
+        write_vector(tiles[i, :size], b[:size])
+        write_vector(tiles[i, size : 2 * size], other[:size])
+        write_vector(tiles[i, 2 * size :], weight)
+        write_vector(score[i], b[SCORE * WIDTH :])
         for l in range(WIDTH):
             score[i, l] += b[NIS * WIDTH + l]
 

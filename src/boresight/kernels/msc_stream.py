@@ -20,6 +20,7 @@ from boresight.kernels.msc import (
 )
 from boresight.kernels.options import PART
 from boresight.kernels.signatures import MATRIX, MOTION, OBSERVATION, STACK, VECTOR
+from boresight.kernels.write import write_matrix, write_vector
 from boresight.types.sensor import FloatArray
 
 EXACT, PRINTED, MENDED = 0, 1, 2
@@ -121,9 +122,9 @@ def msc_stream(
         y = after
         before = own[k]
         now = t[k]
-        y_predicted[k] = y
-        P_predicted[k] = P
-        F_out[k] = Phi
+        write_vector(y_predicted[k], y)
+        write_matrix(P_predicted[k], P)
+        write_matrix(F_out[k], Phi)
         m = observe(world_from_msc(y, before), z[k], context[k], r, H, R)
         nis[k, 0] = 0.0
         nis[k, 1] = m
@@ -131,6 +132,6 @@ def msc_stream(
             y, P, nis[k, 0] = msc_condition(y, P, r[:m].copy(), H[:m].copy(), R[:m, :m].copy())
             if np.isnan(nis[k, 0]):
                 return k
-        y_out[k] = y
-        P_out[k] = P
+        write_vector(y_out[k], y)
+        write_matrix(P_out[k], P)
     return len(t)

@@ -25,6 +25,7 @@ from boresight.kernels.observation import NOISE, IntArray
 from boresight.kernels.signatures import MATRIX, STACK, VECTOR
 from boresight.kernels.tiles import DET, NIS, SCORE, WIDTH, WORK, aligned
 from boresight.kernels.trig import sincos_of_small
+from boresight.kernels.write import write_vector
 from boresight.types.sensor import FloatArray
 
 Blocks = tuple[Six, Nine, Six]
@@ -207,7 +208,7 @@ def run_msc_tiles(
     """As `tiles.run_tiles`, beliefs in MSC about an observer at `own0` (6,) and `own` (k, 6); z (m, k, 3·WIDTH)."""
     b = aligned(WORK)
     for i in range(tiles.shape[0]):
-        b[: ROWS * WIDTH] = tiles[i]
+        write_vector(b, tiles[i])
         b[NIS * WIDTH :] = 0.0
         now, before = t0, own0
         for k in range(t.shape[0]):

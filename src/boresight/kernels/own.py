@@ -18,6 +18,7 @@ from boresight.kernels.gaussian import joseph_update
 from boresight.kernels.observation import IntArray
 from boresight.kernels.signatures import MATRIX, VECTOR
 from boresight.kernels.unwrap import THING, direct, vector
+from boresight.kernels.write import write_matrix, write_vector
 from boresight.types.sensor import FloatArray
 
 SixNumbers = tuple[float, float, float, float, float, float]
@@ -107,8 +108,8 @@ def take(x: FloatArray, P: FloatArray, m: int, y: FloatArray, H: FloatArray, R: 
     if not alone:
         x_new, P_new, _, nis, _ = joseph_update(x, P, y[:m].copy(), H[:m].copy(), R[:m, :m].copy(), N)
         if nis == nis:
-            x[:] = x_new
-            P[:, :] = P_new
+            write_vector(x, x_new)
+            write_matrix(P, P_new)
         return float(nis)
     total = 0.0
     here = (x[0], x[1], x[2], x[3], x[4], x[5])
@@ -147,7 +148,7 @@ def _own_step(belief: Any, report: Any, motion: int, observe: int) -> float:
     x, P = belief[MEAN:COVARIANCE], belief[COVARIANCE:PARAMETERS].reshape((N, N))
     F, Q, T, H, R, y, moved = room()
     move(x, dt, belief[PARAMETERS:], moved, F, Q)
-    x[:] = moved
+    write_vector(x, moved)
     advance(F, P, Q, T)
     nis = take(x, P, see(x, report[MEASURED:CONTEXT], report[CONTEXT:], y, H, R), y, H, R)
     belief[TIME] = report[TIME]
@@ -183,7 +184,7 @@ def own_stream(
         if not dt >= 0.0:
             return k
         move(x, dt, parameters, moved, F, Q)
-        x[:] = moved
+        write_vector(x, moved)
         advance(F, P, Q, T)
         value = take(x, P, see(x, z[k], contexts[sensor[k]], y, H, R), y, H, R)
         belief[TIME] = t[k]

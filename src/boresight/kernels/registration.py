@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from boresight.kernels.options import PART, SMALL
+from boresight.kernels.write import write_matrix
 from boresight.types.sensor import FloatArray
 
 TIME, RANGE, SCALE, AZIMUTH, ELEVATION = 0, 1, 2, 3, 4
@@ -79,7 +80,7 @@ def pool(
     """
     k = len(sigma)
     first = x.shape[1] - k
-    pooled[:, :] = bank
+    write_matrix(pooled, bank)
     for a in range(k):
         pooled[a, a] += 1.0 / sigma[a] ** 2
     info = np.empty((k, k))

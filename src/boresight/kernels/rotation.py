@@ -48,7 +48,8 @@ def quaternion_from_ypr(yaw: float, pitch: float, roll: float) -> FloatArray:
     q[2] = cy * sp * cr + sy * cp * sr
     q[3] = sy * cp * cr - cy * sp * sr
     if q[0] < 0.0:
-        q[:] = -q
+        for k in range(4):
+            q[k] = -q[k]
     return q
 
 
@@ -94,7 +95,8 @@ def quaternion_from_matrix(R: FloatArray) -> FloatArray:
     q[1 + j] = k * (R[j, i] + R[i, j])
     q[1 + m] = k * (R[m, i] + R[i, m])
     if q[0] < 0.0:
-        q[:] = -q
+        for k in range(4):
+            q[k] = -q[k]
     return q
 
 
@@ -136,7 +138,8 @@ def rotation_vector_from_quaternion(q: FloatArray) -> FloatArray:
 def step_between(p: FloatArray, q: FloatArray) -> FloatArray:
     """Return the rotation vector (3,), in the axes of `p`, that takes the attitude `p` to `q` the shorter way."""
     inverse = p.copy()
-    inverse[1:] = -inverse[1:]
+    for k in range(1, 4):
+        inverse[k] = -inverse[k]
     return rotation_vector_from_quaternion(multiply(inverse, q))
 
 

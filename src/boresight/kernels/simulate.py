@@ -11,6 +11,7 @@ from numba import njit, types
 from boresight.kernels.measurement import measure
 from boresight.kernels.options import PART
 from boresight.kernels.signatures import MATRIX, MOTION, STACK, VECTOR
+from boresight.kernels.write import write_vector
 from boresight.types.sensor import FloatArray
 
 
@@ -41,7 +42,7 @@ def walk(
     n = x0.shape[0]
     F, Q, L = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
     x, moved = x0.copy(), np.empty(n)
-    out[0] = x
+    write_vector(out[0], x)
     for k in range(1, t.shape[0]):
         motion(x, t[k] - t[k - 1], parameters, moved, F, Q)
         root(Q, L)
@@ -50,7 +51,7 @@ def walk(
             for j in range(i + 1):
                 s += L[i, j] * normals[k, j]
             x[i] = s
-        out[k] = x
+        write_vector(out[k], x)
 
 
 @njit(types.void(MATRIX, MATRIX, MATRIX, MATRIX, STACK, MATRIX), cache=True)

@@ -7,6 +7,7 @@ from numba import njit
 
 from boresight.kernels.gaussian import cholesky, solve_lower, solve_upper
 from boresight.kernels.options import PART
+from boresight.kernels.write import write_matrix, write_vector
 from boresight.types.sensor import FloatArray
 
 
@@ -27,7 +28,7 @@ def smoother_gain(P: FloatArray, F: FloatArray, P_predicted: FloatArray) -> Floa
             row[j] = s
         solve_lower(L, row)
         solve_upper(L, row)
-        G[i] = row
+        write_vector(G[i], row)
     return G
 
 
@@ -48,8 +49,8 @@ def smooth_back(
     P_s = (I - GF)P(I - GF)ᵀ + G(P_s⁺ + Q)Gᵀ is used in the form P + G(P_s⁺ - P_predicted)Gᵀ, made symmetric.
     """
     n = x.shape[1]
-    x_out[last] = x[last]
-    P_out[last] = P[last]
+    write_vector(x_out[last], x[last])
+    write_matrix(P_out[last], P[last])
     for k in range(last - 1, first - 1, -1):
         G = smoother_gain(P[k], F[k + 1], P_predicted[k + 1])
         D = P_out[k + 1] - P_predicted[k + 1]
@@ -90,5 +91,5 @@ def smooth_lagged(
         while last + 1 < k and t[last + 1] <= t[i] + lag:
             last += 1
         smooth_back(x, P, x_predicted, P_predicted, F, i, max(last, i), x_work, P_work)
-        x_out[i] = x_work[i]
-        P_out[i] = P_work[i]
+        write_vector(x_out[i], x_work[i])
+        write_matrix(P_out[i], P_work[i])

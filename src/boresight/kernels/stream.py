@@ -11,6 +11,7 @@ from numba import njit, types
 from boresight.kernels.gaussian import joseph_update, sandwich
 from boresight.kernels.iterated import iterated_update
 from boresight.kernels.signatures import MATRIX, MOTION, OBSERVATION, STACK, VECTOR
+from boresight.kernels.write import write_matrix, write_vector
 from boresight.types.sensor import FloatArray
 
 
@@ -61,8 +62,8 @@ def ekf_stream(
         P = sandwich(F, P, Q)
         x = moved.copy()
         now = t[k]
-        x_predicted[k] = x
-        P_predicted[k] = P
+        write_vector(x_predicted[k], x)
+        write_matrix(P_predicted[k], P)
         m = observe(x, z[k], context[k], y, H, R)
         nis[k, 0] = 0.0
         nis[k, 1] = m
@@ -78,8 +79,8 @@ def ekf_stream(
             nis[k, 0] = value
             if nis.shape[1] > 2:
                 nis[k, 2] = log_likelihood
-        x_out[k] = x
-        P_out[k] = P
+        write_vector(x_out[k], x)
+        write_matrix(P_out[k], P)
     return len(t)
 
 
@@ -117,7 +118,7 @@ def bound_stream(
         F = F_out[k]
         motion(x, t[k] - now, parameters, moved, F, Q)
         P = sandwich(F, P, Q)
-        P_predicted[k] = P
+        write_matrix(P_predicted[k], P)
         x = truth[k].copy()
         now = t[k]
         m = observe(x, z[k], context[k], y, H, R)
@@ -126,5 +127,5 @@ def bound_stream(
             _, P, _, value, _ = joseph_update(x, P, y[:m], H[:m], Rm, n)
             if np.isnan(value):
                 return k
-        P_out[k] = P
+        write_matrix(P_out[k], P)
     return len(t)

@@ -17,6 +17,7 @@ from boresight.kernels.blocks import ROWS, Nine, Three, condition, condition_rat
 from boresight.kernels.observation import NOISE, POSITION, ROTATION, VELOCITY, IntArray
 from boresight.kernels.sight import polar, range_rate, turned_polar
 from boresight.kernels.signatures import MATRIX, STACK, VECTOR
+from boresight.kernels.write import write_vector
 from boresight.types.sensor import FloatArray
 
 WIDTH = 64
@@ -245,7 +246,7 @@ def run_tiles(
     room = aligned(WORK + SEEN)
     work, seen = room[:WORK], room[WORK:]
     for i in range(tiles.shape[0]):
-        work[: ROWS * WIDTH] = tiles[i]
+        write_vector(work, tiles[i])
         work[NIS * WIDTH :] = 0.0
         now = t0
         for k in range(t.shape[0]):
@@ -253,7 +254,7 @@ def run_tiles(
             now = t[k]
             report_tile(work, seen, z[i, k], contexts[sensor[k]])
             if kept.shape[0] > 0:
-                kept[i, k] = work[: ROWS * WIDTH]
-        tiles[i] = work[: ROWS * WIDTH]
-        score[i] = work[SCORE * WIDTH :]
+                write_vector(kept[i, k], work[: ROWS * WIDTH])
+        write_vector(tiles[i], work[: ROWS * WIDTH])
+        write_vector(score[i], work[SCORE * WIDTH :])
         score[i, :WIDTH] += work[NIS * WIDTH : DET * WIDTH]

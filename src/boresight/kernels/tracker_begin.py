@@ -27,6 +27,7 @@ from boresight.kernels.tracker import (
 from boresight.kernels.tracker_place import Places, fix_sensitivity
 from boresight.kernels.tracker_state import apply_update, innovation, linearise
 from boresight.kernels.tracker_workroom import workroom
+from boresight.kernels.write import write_matrix, write_vector
 from boresight.types.sensor import FloatArray
 
 
@@ -215,8 +216,8 @@ def save_lesson(tr: Tracks, i: int, s: Settings) -> None:
     learned(tr.x[i], tr.P[i], tr.x.shape[1] - k, info, vector)
     tr.bank[:, :k] += info - tr.told[i, :, :k]
     tr.bank[:, k] += vector - tr.told[i, :, k]
-    tr.told[i, :, :k] = info
-    tr.told[i, :, k] = vector
+    write_matrix(tr.told[i], info)
+    write_vector(tr.told[i, :, k], vector)
 
 
 @njit(**PART)

@@ -20,6 +20,7 @@ from boresight.kernels.observation import NOISE, POSITION, ROTATION, IntArray
 from boresight.kernels.sight import into, polar
 from boresight.kernels.signatures import MATRIX, STACK, VECTOR
 from boresight.kernels.tiles import DET, NIS, SCORE, WIDTH, WORK, aligned, move_tile
+from boresight.kernels.write import write_vector
 from boresight.types.sensor import FloatArray
 
 Points = tuple[Three, Three, Three, Three, Three, Three, Three]
@@ -152,7 +153,7 @@ def run_ukf_tiles(
     total = scaling[0] ** 2 * (6.0 + scaling[2])
     rest = 1.0 - 6.0 / total + 1.0 - scaling[0] ** 2 + scaling[1] + 6.0 * 0.5 / total
     for i in range(tiles.shape[0]):
-        b[: ROWS * WIDTH] = tiles[i]
+        write_vector(b, tiles[i])
         b[NIS * WIDTH :] = 0.0
         now = t0
         for k in range(t.shape[0]):

@@ -15,6 +15,7 @@ from numba import njit, types
 
 from boresight.kernels.gaussian import cholesky, joseph_update, sandwich, solve_upper
 from boresight.kernels.signatures import MATRIX, MOTION, OBSERVATION, STACK, VECTOR
+from boresight.kernels.write import write_matrix, write_vector
 from boresight.types.sensor import FloatArray
 
 
@@ -62,7 +63,7 @@ def linearise(L: FloatArray, Y: FloatArray, scaling: FloatArray) -> tuple[FloatA
         for i in range(n):
             column[i] = w * s * (Y[1 + i, a] - Y[1 + n + i, a])
         solve_upper(L, column)
-        A[a] = column
+        write_vector(A[a], column)
     slope = np.zeros((m, n))  # A L
     for a in range(m):
         for i in range(n):
@@ -119,14 +120,14 @@ def ukf_stream(
             return k
         for i in range(2 * n + 1):
             motion(X[i], dt, parameters, moved, F, Q)
-            images[i] = moved
+            write_vector(images[i], moved)
             if i == 0:
                 noise = Q.copy()
         x, A, Omega = linearise(L, images, scaling)
         P = sandwich(A, P, Omega + noise)
-        F_out[k] = A
-        x_predicted[k] = x
-        P_predicted[k] = P
+        write_matrix(F_out[k], A)
+        write_vector(x_predicted[k], x)
+        write_matrix(P_predicted[k], P)
         now = t[k]
         X, L = sigma_points(x, P, scaling)
         if np.isnan(X[0, 0]):
@@ -140,11 +141,11 @@ def ukf_stream(
             for i in range(2 * n + 1):
                 if observe(X[i], z[k], context[k], y, H, R) != m:
                     return k
-                Y[i] = y[:m]
+                write_vector(Y[i], y[:m])
             mean, A, Omega = linearise(L, Y, scaling)
             x, P, _, nis[k, 0], _ = joseph_update(x, P, mean, -A, Rm + Omega, n)
             if np.isnan(nis[k, 0]):
                 return k
-        x_out[k] = x
-        P_out[k] = P
+        write_vector(x_out[k], x)
+        write_matrix(P_out[k], P)
     return len(t)

@@ -1,8 +1,12 @@
-"""Whether the tracker's kernels lie compiled in Numba's cache."""
+"""Whether the tracker's kernels lie compiled in Numba's cache, and how they get there while something else goes on."""
 
 from __future__ import annotations
 
+import contextlib
 import os
+import subprocess
+import sys
+from collections.abc import Iterator
 from typing import Any
 
 
@@ -19,3 +23,22 @@ def compiled() -> bool:
     except AttributeError:
         return True
     return bool(os.path.exists(index))
+
+
+@contextlib.contextmanager
+def compiling_beside(dimensions: int) -> Iterator[bool]:
+    """Compile the tracker in a second process while the body runs, unless that is done; gives whether it is not.
+
+    Leaves when both are through. Should the second process fail, the kernels are compiled when they are called.
+    """
+    if compiled():
+        yield False
+        return
+    command = f"from boresight.tracking.warm import warm; warm({dimensions})"
+    child = subprocess.Popen([sys.executable, "-c", command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield True
+        child.wait()
+    finally:
+        child.kill()
+        child.wait()
