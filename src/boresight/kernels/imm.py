@@ -280,10 +280,14 @@ def imm_stream(
             write_vector(X[j], mean)
             write_matrix(P[j], covariance)
         weights = reweigh(weights, log_likelihoods)
-        x_out[k], P_out[k] = combine(weights, X, P, n_out)
+        mean, covariance = combine(weights, X, P, n_out)
+        write_vector(x_out[k], mean)
+        write_matrix(P_out[k], covariance)
         write_vector(weights_out[k], weights)
         if X_kept.shape[0] > 0:
-            X_kept[k], P_kept[k] = X, P
+            write_matrix(X_kept[k], X)
+            for j in range(len(P)):
+                write_matrix(P_kept[k, j], P[j])
         if memory > 0.0:
             s = sensor[k]
             learn(observe, x_out[k], P_out[k], z[k], context[k], scale[s], bias[s], seen[s], memory, limit)

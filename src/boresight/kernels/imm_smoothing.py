@@ -20,6 +20,7 @@ from boresight.kernels.observation import IntArray
 from boresight.kernels.options import PART
 from boresight.kernels.signatures import MATRIX, MOTION, STACK, VECTOR
 from boresight.kernels.smoothing import smoother_gain
+from boresight.kernels.write import write_matrix, write_vector
 from boresight.types.sensor import FloatArray
 
 
@@ -109,19 +110,41 @@ def step_back(
                 for b in range(n):
                     means[i, j, a] += G[a, b] * e[b]
             D = later_P[j, :n, :n] - predicted
-            covariances[i, j, :own, :own] = sandwich(G, D, P[i, :own, :own])
+            write_matrix(covariances[i, j], sandwich(G, D, P[i, :own, :own]))
         best = logs.max()
         for i in range(r):
             share[i, j] = math.exp(logs[i] - best)
-        share[:, j] *= later_weights[j] / share[:, j].sum()
+        total = later_weights[j] / share[:, j].sum()
+        for i in range(r):
+            share[i, j] *= total
     out, X_out, P_out = np.zeros(r), np.zeros((r, N)), np.zeros((r, N, N))
     for i in range(r):
         out[i] = share[i].sum()
         if out[i] < NEGLIGIBLE:
-            X_out[i], P_out[i] = X[i], P[i]
+            write_vector(X_out[i], X[i])
+            write_matrix(P_out[i], P[i])
         else:
-            X_out[i], P_out[i] = combine(share[i] / out[i], means[i], covariances[i], N)
+            mean, covariance = combine(share[i] / out[i], means[i], covariances[i], N)
+            write_vector(X_out[i], mean)
+            write_matrix(P_out[i], covariance)
     return out, X_out, P_out
+
+
+@njit(**PART)
+def keep(
+    weights: FloatArray,
+    X: FloatArray,
+    P: FloatArray,
+    n_out: int,
+    x_out: FloatArray,
+    P_out: FloatArray,
+    weights_out: FloatArray,
+) -> None:
+    """Fill the combined mean and covariance of the first `n_out` components, and the weights."""
+    mean, covariance = combine(weights, X, P, n_out)
+    write_vector(x_out, mean)
+    write_matrix(P_out, covariance)
+    write_vector(weights_out, weights)
 
 
 @njit(
@@ -160,8 +183,7 @@ def imm_smooth(
                 w, x, V = step_back(
                     motion, parameters, sizes, labels, rates, t[k + 1] - t[k], weights[k], X[k], P[k], w, x, V
                 )
-            x_out[k], P_out[k] = combine(w, x, V, n_out)
-            weights_out[k] = w
+            keep(w, x, V, n_out, x_out[k], P_out[k], weights_out[k])
         return
     end = 0
     for first in range(last + 1):
@@ -172,5 +194,4 @@ def imm_smooth(
             w, x, V = step_back(
                 motion, parameters, sizes, labels, rates, t[k + 1] - t[k], weights[k], X[k], P[k], w, x, V
             )
-        x_out[first], P_out[first] = combine(w, x, V, n_out)
-        weights_out[first] = w
+        keep(w, x, V, n_out, x_out[first], P_out[first], weights_out[first])

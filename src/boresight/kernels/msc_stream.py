@@ -30,7 +30,8 @@ EXACT, PRINTED, MENDED = 0, 1, 2
 def world_from_msc(y: FloatArray, own: FloatArray) -> FloatArray:
     """Return the Cartesian world state of MSC `y` about an observer with position and velocity `own` (6,)."""
     x = cartesian_from_msc(y)
-    x[:6] += own
+    for i in range(6):
+        x[i] += own[i]
     return x
 
 
@@ -38,7 +39,8 @@ def world_from_msc(y: FloatArray, own: FloatArray) -> FloatArray:
 def msc_from_world(x: FloatArray, own: FloatArray) -> FloatArray:
     """Return MSC of the world state `x` about an observer with position and velocity `own` (6,)."""
     s = x.copy()
-    s[:6] -= own
+    for i in range(6):
+        s[i] -= own[i]
     return msc_from_cartesian(s)
 
 

@@ -223,7 +223,7 @@ def run_msc_tiles(
             c = contexts[sensor[k]]
             noise = (c[NOISE], c[NOISE + 8], c[NOISE + 16])
             report_msc_tile(b, z[i, k], noise, 1.0 if c[NOISE] > 0.0 else 0.0)
-        tiles[i] = b[: ROWS * WIDTH]
-        score[i] = b[SCORE * WIDTH :]
+        write_vector(tiles[i], b[: ROWS * WIDTH])
+        write_vector(score[i], b[SCORE * WIDTH :])
         for l in range(WIDTH):
             score[i, l] += b[NIS * WIDTH + l]

@@ -191,7 +191,7 @@ def own_stream(
         if math.isnan(value):
             return k
         if kept.shape[0] > 0:
-            kept[k] = belief[MEAN:PARAMETERS]
+            write_vector(kept[k], belief[MEAN:PARAMETERS])
         if nis.shape[0] > 0:
             nis[k] = value
     return len(t)

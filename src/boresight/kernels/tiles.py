@@ -257,4 +257,5 @@ def run_tiles(
                 write_vector(kept[i, k], work[: ROWS * WIDTH])
         write_vector(tiles[i], work[: ROWS * WIDTH])
         write_vector(score[i], work[SCORE * WIDTH :])
-        score[i, :WIDTH] += work[NIS * WIDTH : DET * WIDTH]
+        for l in range(WIDTH):
+            score[i, l] += work[NIS * WIDTH + l]

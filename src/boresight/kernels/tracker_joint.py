@@ -18,6 +18,7 @@ from boresight.kernels.tracker_place import Places
 from boresight.kernels.tracker_state import condition, existence, learners
 from boresight.kernels.tracker_weigh import moving_likelihood, note_hit, static_likelihood, weigh
 from boresight.kernels.tracker_workroom import Workroom
+from boresight.kernels.write import write_matrix, write_vector
 from boresight.types.sensor import FloatArray
 
 MOST_STATES = 300_000.0  # of a cluster of tracks that is worked out exactly
@@ -106,8 +107,8 @@ def still_ratio(
     moving = moving_likelihood(tr, i, s, sensor, look, k, at, room)
     ratio = math.exp(min(static_likelihood(tr, i, s, room.fix, at.covariance[k], room) - moving, 100.0))
     if not update:
-        tr.anchor[i] = anchor
-        tr.anchor_P[i] = anchor_P
+        write_vector(tr.anchor[i], anchor)
+        write_matrix(tr.anchor_P[i], anchor_P)
     return ratio
 
 
@@ -140,13 +141,14 @@ def mix(
             continue
         x, P = prior.copy(), prior_P.copy()
         condition(x, P, s.d, column[e], look, sensor, room, considered)
-        step = x - prior
-        mean += beta * step
-        square += beta * (P + np.outer(step, step))
+        for a in range(n):  # written out: expressions with whole arrays take seconds to compile
+            mean[a] += beta * (x[a] - prior[a])
+            for b in range(a + 1):
+                square[a, b] += beta * (0.5 * (P[a, b] + P[b, a]) + (x[a] - prior[a]) * (x[b] - prior[b]))
         left -= beta
-    square += max(left, 0.0) * prior_P - np.outer(mean, mean)
     for a in range(n):
         tr.x[i, a] = prior[a] + mean[a]
         for b in range(a + 1):
-            tr.P[i, a, b] = 0.5 * (square[a, b] + square[b, a])
+            before = 0.5 * (prior_P[a, b] + prior_P[b, a])
+            tr.P[i, a, b] = square[a, b] + max(left, 0.0) * before - mean[a] * mean[b]
             tr.P[i, b, a] = tr.P[i, a, b]

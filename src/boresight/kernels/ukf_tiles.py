@@ -165,7 +165,7 @@ def run_ukf_tiles(
             position = (c[POSITION], c[POSITION + 1], c[POSITION + 2])
             noise = (c[NOISE], c[NOISE + 8], c[NOISE + 16])
             unscented_tile(b, z[i, k], position, R, noise, 1.0 if c[NOISE] > 0.0 else 0.0, total, rest)
-        tiles[i] = b[: ROWS * WIDTH]
-        score[i] = b[SCORE * WIDTH :]
+        write_vector(tiles[i], b[: ROWS * WIDTH])
+        write_vector(score[i], b[SCORE * WIDTH :])
         for l in range(WIDTH):
             score[i, l] += b[NIS * WIDTH + l]

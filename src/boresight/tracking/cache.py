@@ -26,15 +26,16 @@ def compiled() -> bool:
 
 
 @contextlib.contextmanager
-def compiling_beside(dimensions: int) -> Iterator[bool]:
+def compiling_beside(dimensions: int, blobs: bool = False) -> Iterator[bool]:
     """Compile the tracker in a second process while the body runs, unless that is done; gives whether it is not.
 
-    Leaves when both are through. Should the second process fail, the kernels are compiled when they are called.
+    With `blobs` both the plain kernel and the one that looks for second targets in a blob. Leaves when both processes
+    are through. Should the second process fail, the kernels are compiled when they are called.
     """
     if compiled():
         yield False
         return
-    command = f"from boresight.tracking.warm import warm; warm({dimensions})"
+    command = f"from boresight.tracking.warm import warm; warm({dimensions}, {blobs})"
     child = subprocess.Popen([sys.executable, "-c", command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         yield True

@@ -9,11 +9,19 @@ from boresight.tracking.tracker import Tracker
 from boresight.types import Component, Scan, Sensor, SensorKind
 
 
-def warm(dimensions: int) -> None:
-    """Take one look through a tracker of `dimensions`, so that its kernels are compiled and loaded."""
+def warm(dimensions: int, blobs: bool = False) -> None:
+    """Take one look through a tracker of `dimensions`, so that its kernels are compiled and loaded.
+
+    With `blobs` also through one that looks for second targets in a blob, whose kernel is another.
+    """
+    for share in (0.0, 0.1) if blobs else (0.0,):
+        _look(TrackerConfig(blob_share=share), dimensions)
+
+
+def _look(config: TrackerConfig, dimensions: int) -> None:
     sigma = np.full(7, np.nan)
     sigma[[Component.RANGE, Component.AZIMUTH]] = 1.0, 0.01
-    tracker = Tracker(TrackerConfig(), (Sensor("warm", SensorKind.RADAR, sigma=sigma),), dimensions)
+    tracker = Tracker(config, (Sensor("warm", SensorKind.RADAR, sigma=sigma),), dimensions)
     state = tracker.init()
     z = np.full((1, 7), np.nan)
     z[0, [Component.RANGE, Component.AZIMUTH]] = 1000.0, 0.0
