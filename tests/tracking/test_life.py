@@ -238,3 +238,25 @@ def test_rows_come_until_a_look_is_expected_and_again_where_it_is_late() -> None
         state, out = used.step(state, points(t, [[300.0, 400.0]], first=k))
         rows = [(round(float(a), 6), round(float(b), 6)) for r in out.rows for a, b in zip(r.t, r.t_known, strict=True)]
     assert rows == [(6.0, 6.0), (6.4, 6.0), (6.8, 6.0), (7.2, 7.2), (7.6, 7.6)]
+
+
+def test_time_alone_brings_the_rows_that_are_due() -> None:
+    used = tracker()
+    state = after(used, [[300.0, 400.0]])
+    x = state.window.tracks.x[0].copy()
+    times = np.concatenate([r.t for r in used.tick(state, 13.0).rows])
+    np.testing.assert_allclose(times, [10.0, 10.4, 10.8, 11.2, 11.6, 12.0, 12.4, 12.8])
+    np.testing.assert_array_equal(state.window.tracks.x[0], x)
+
+
+def test_a_smoothed_row_coasts_after_the_last_hit_that_the_track_ever_had() -> None:
+    used = tracker(smoothing_lag=1.0, coast_after=3.0)
+    state, rows = used.init(), []
+    for k in range(10):
+        state, out = used.step(state, points(2.0 * k, [[300.0, 400.0]] if k < 6 else [], first=100 * k))
+        rows += out.smoothed
+    state, out = used.finish(state)
+    coasting = {float(t): bool(c) for r in rows + out.smoothed for t, c in zip(r.t, r.coasting, strict=True)}
+    assert min(coasting) < 10.0
+    assert max(coasting) > 14.0
+    assert all(c == (t > 10.0 + 3.0) for t, c in coasting.items())

@@ -11,7 +11,7 @@ from boresight.io.scans import iter_scans
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.names import MAX_ROW_GAP, Names
 from boresight.tracking.output import Rows
-from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
+from boresight.tracking.run import NAVIGATION_AHEAD, decision_rows, run, track_rows, tracker_for
 from boresight.tracking.tracker import Output, Tracker, TrackerState
 from boresight.types import FATES, Coverage, DecisionRows, Fate, Recording, Scan, Sensor, SensorKind
 from tests.tracking.test_tracker import CONFIG, same
@@ -44,6 +44,10 @@ def test_many_looks_at_a_time_give_what_one_by_one_gives(harbour: Recording, lag
     for name in (f.name for f in dataclasses.fields(DecisionRows) if f.name != "extra"):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
     assert len({*a.fate.tolist()}) >= 5
+    d, screened = recording.detections, a.fate == FATES.index(Fate.SCREENED)
+    beyond = (d.t > 40.0 + NAVIGATION_AHEAD + 1.0) & ~np.isnan(d.z).all(axis=1)  # the radar's stamps are a second late
+    assert screened[beyond].all()
+    assert not screened[d.t < 40.0].any()
     n = int(many.window.tracks.live[0])
     np.testing.assert_array_equal(many.window.tracks.x[:n], one_by_one[0].window.tracks.x[:n])
     assert (len(smoothed) > 0) == (lag is not None)
