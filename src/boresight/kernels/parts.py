@@ -24,10 +24,11 @@ class PartLibrary(JITCodeLibrary):
     """Code to be put into others: never optimised in full, never machine code, cached as bitcode."""
 
     def _optimize_final_module(self) -> None:
-        manager, builder = self._codegen._module_pass_manager(
+        made = self._codegen._module_pass_manager(
             loop_vectorize=self._codegen._loopvect, slp_vectorize=False, opt=self._codegen._opt_level, cost="cheap"
         )
-        manager.run(self._final_module, builder)
+        manager, *builder = made if isinstance(made, tuple) else (made,)  # a pair since Numba 0.62
+        manager.run(self._final_module, *builder)
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
