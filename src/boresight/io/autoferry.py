@@ -76,7 +76,7 @@ TRACKER_TOML = """\
 # Settings for the Autoferry sensor suite, one set for all scenarios; `boresight track` uses this file unless --config
 # names another.
 [tracker]
-gate_probability = 0.95
+gate_probability = 0.97
 speed_sigma_m_s = 4.5
 birth_rate = 0.005
 targets_at_start = 2.0
