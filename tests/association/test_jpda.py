@@ -64,7 +64,7 @@ def test_a_track_that_cannot_be_missed() -> None:
 
 @pytest.mark.parametrize(("n", "m"), [(7, 7), (6, 12), (12, 6), (10, 10)])
 def test_marginals_equal_pyehm(n: int, m: int) -> None:
-    EHM2 = pytest.importorskip("pyehm.core", reason="PyEHM is not installed").EHM2
+    EHM2 = pytest.importorskip("pyehm.core", reason="PyEHM is not installed (bench extra)").EHM2
     rng = np.random.default_rng(n * m)
     for _ in range(10):
         weight, miss = problem(rng, n, m)

@@ -1,4 +1,4 @@
-"""Agreement with FilterPy and Stone Soup on the same inputs; skipped where they are not installed (bench extra)."""
+"""Agreement with FilterPy (test extra) and Stone Soup (bench extra) on the same inputs; skipped where not installed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from boresight.models import Infrared, NearlyConstantVelocity, Radar
 MOTION = NearlyConstantVelocity(q=0.5)
 X0, P0 = np.array([900.0, 500, 80, -10, 5, 0]), np.diag([400.0, 400, 400, 100, 100, 100])
 SENSORS = [Radar(5.0, 0.01, 0.01), Infrared(2e-3, 2e-3), Infrared(2e-3, 2e-3)]
-NO_FILTERPY = "filterpy is not installed (bench extra)"
+NO_FILTERPY = "filterpy is not installed (test extra)"
 NO_STONESOUP = "stonesoup is not installed (bench extra)"
 
 
