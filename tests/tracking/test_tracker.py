@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import itertools
 import subprocess
 import sys
 from pathlib import Path
@@ -166,6 +167,27 @@ def test_stepping_a_snapshot_equals_stepping_the_original(harbour: Recording) ->
     _, b, _ = run(tracker, scans[150:], copy)
     same(track_rows(before + a), track_rows(before + b))
     same(track_rows(before + a), tracked(harbour))
+
+
+def test_a_snapshot_and_the_original_stepped_in_turn(harbour: Recording) -> None:
+    """Neither writes to what the other holds, in the middle of the window either."""
+    tracker = tracker_for(harbour, CONFIG)
+    scans = list(iter_scans(harbour))
+    state, before, _ = run(tracker, scans[:150], finish=False)
+    copy = snapshot(state)
+    a, b = list(before), list(before)
+    for scan, other in itertools.pairwise(scans[150:]):  # the copy misses one look: what it writes differs
+        state, out = tracker.step(state, scan)
+        a += out.rows
+        copy, out = tracker.step(copy, other)
+        b += out.rows
+    alone, rows, _ = run(tracker, scans[:150], finish=False)
+    for scan in scans[151:]:
+        alone, out = tracker.step(alone, scan)
+        rows += out.rows
+    same(track_rows(b), track_rows(rows))
+    _, rows, _ = run(tracker, scans[:-1], finish=False)
+    same(track_rows(a), track_rows(rows))
 
 
 RESUME = """

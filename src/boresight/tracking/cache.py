@@ -35,11 +35,16 @@ def compiling_beside(dimensions: int, blobs: bool = False) -> Iterator[bool]:
     if compiled():
         yield False
         return
-    command = f"from boresight.tracking.warm import warm; warm({dimensions}, {blobs})"
-    child = subprocess.Popen([sys.executable, "-c", command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    command = warming(dimensions, blobs)
+    child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         yield True
         child.wait()
     finally:
         child.kill()
         child.wait()
+
+
+def warming(dimensions: int, blobs: bool = False) -> list[str]:
+    """Return the command that does what `warm` does in a process of its own."""
+    return [sys.executable, "-c", f"from boresight.tracking.warm import warm; warm({dimensions}, {blobs})"]
