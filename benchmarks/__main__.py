@@ -30,12 +30,13 @@ def main() -> int:
     quick = arguments.quick
     with compiling_beside(2, blobs=True):  # where nothing is cached: one core for the tracker, one for the filters
         from benchmarks import rows as every
+        from benchmarks import table
     rows = every.all_rows(quick)
     result = {"command": "benchmarks", "version": __version__, "parameters": every.versions(), "rows": rows}
     if not arguments.quick:
         path = Path(__file__).with_name("results.json")
         path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-        every.table.write(result)
+        table.write(result)
     if arguments.json:
         print(json.dumps(result, indent=1))
         return 0

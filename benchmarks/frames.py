@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import timeit
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pymap3d
@@ -109,12 +110,13 @@ def main() -> None:
     """Print the table."""
     print(f"{'transform':26s} {'scalar µs':>10s} {'peer µs':>9s} {'ratio':>6s}   ", end="")
     print(f"{'1e5 ms':>8s} {'peer ms':>8s} {'ratio':>6s}")
-    rows = []
+    rows: list[tuple[str, float, float, float, float]] = []
     for name, ours, theirs, arrays in cases():
         one = tuple(float(a[7]) for a in arrays)
-        runs = [(ours, one), (theirs, one), (ours, arrays), (theirs, arrays)]
-        rows.append((name, *(seconds(lambda f=f, a=a: f(*a)) for f, a in runs)))
-    rows += [(name, *(seconds(call) for call in calls)) for name, *calls in rotation_cases()]
+        few = seconds(partial(ours, *one)), seconds(partial(theirs, *one))
+        rows.append((name, *few, seconds(partial(ours, *arrays)), seconds(partial(theirs, *arrays))))
+    for name, a, b, c, d in rotation_cases():
+        rows.append((name, seconds(a), seconds(b), seconds(c), seconds(d)))
     for name, us, peer, many, peer_many in rows:
         print(
             f"{name:26s} {us * 1e6:10.2f} {peer * 1e6:9.2f} {peer / us:6.1f}   "

@@ -95,7 +95,7 @@ def with_truth(recording: Recording, settings: TrackerConfig) -> dict[str, tuple
         R[:, 4:, 4:] = np.eye(3) * 0.25
         parts.append((np.full(len(t), k), np.full(len(t), true), t, z, R, np.nan_to_num(position), np.ones(len(t))))
     columns = [np.concatenate(c) for c in zip(*parts, strict=True)]
-    observed = Observed(*columns, (*everything.poses, None), len(recording.truth))
+    observed = Observed._make([*columns, (*everything.poses, None), len(recording.truth)])
     coloured = {}
     for i, one in enumerate(recording.sensors):
         e = settings.sensors.get(one.id, SensorErrors())

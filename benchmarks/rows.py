@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import platform
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from benchmarks import assignment, batch, filters, recording, scoreboard, startup, whole_tracker
 from benchmarks.timing import Contenders, Row, row, rows_of, timed
 from boresight._version import __version__
+from boresight.io.scans import iter_scans
 from boresight.study.engine import cores
+from boresight.tracking.run import run, tracker_for
 
 
 def filter_rows(quick: bool) -> list[Row]:
@@ -30,13 +35,13 @@ def filter_rows(quick: bool) -> list[Row]:
         "boresight, packed, own models": (lambda: [own_calls() for _ in range(20)], 20 * size),
         "boresight": (lambda: [filters.friendly(part) for _ in range(20)], 20 * size),
     }
-    contenders |= {name: (lambda p=peer: p(part), size) for name, peer in peers.items()}
+    contenders |= {name: (partial(peer, part), size) for name, peer in peers.items()}
     one = rows_of("one report per call", contenders, 5 if quick else 9, "us per report", 1e6)
     many = filters.rows(20_000)
     whole, general = filters.packed_stream(many), filters.prepared(many)
     _, own_whole = filters.own_models(many)
-    for name, call in {"general": general, "own models": own_whole}.items():
-        np.testing.assert_allclose(call(), whole(), rtol=0, atol=1e-6, err_msg=name)
+    for name, other in {"general": general, "own models": own_whole}.items():
+        np.testing.assert_allclose(other(), whole(), rtol=0, atol=1e-6, err_msg=name)
     streams: Contenders = {
         "boresight": (lambda: [whole() for _ in range(10)], 10 * len(many)),
         "boresight, own models": (lambda: [own_whole() for _ in range(3)], 3 * len(many)),
@@ -54,20 +59,25 @@ def filter_rows(quick: bool) -> list[Row]:
     return one + stream
 
 
+def _again(call: Callable[[Any], Any], argument: Any, times: int) -> None:
+    for _ in range(times):
+        call(argument)
+
+
 def assignment_rows(quick: bool) -> list[Row]:
     """Gate and assignment at growing size: equal cost, then time."""
     out, ours = [], {}
     for targets in (100, 1000, 5000):
         f = assignment.frame(targets)
         calls = 20_000 // targets
-        contenders: Contenders = {"boresight": (lambda f=f, c=calls: [assignment.ours(f) for _ in range(c)], calls)}
+        contenders: Contenders = {"boresight": (partial(_again, assignment.ours, f, calls), calls)}
         if targets < 5000 or not quick:  # the dense matrix of 5,000 takes seconds
             np.testing.assert_allclose(assignment.dense(f), assignment.ours(f), rtol=1e-9)
-            contenders["SciPy dense"] = (lambda f=f: assignment.dense(f), 1)
+            contenders["SciPy dense"] = (partial(assignment.dense, f), 1)
         if targets == 100:
             prepared = assignment.stone_soup(f)
             np.testing.assert_allclose(assignment.stone_soup_cost(prepared), assignment.ours(f), rtol=1e-9)
-            contenders["Stone Soup"] = (lambda p=prepared: assignment.stone_soup_cost(p), 1)
+            contenders["Stone Soup"] = (partial(assignment.stone_soup_cost, prepared), 1)
         out += rows_of(f"gate and assignment, {targets} targets", contenders, 3 if quick else 5, "ms", 1e3)
         ours[targets] = next(r["value"] for r in out if r["work"].endswith(f" {targets} targets"))
     growth = float(np.log(ours[5000] / ours[100]) / np.log(50.0))
@@ -76,27 +86,31 @@ def assignment_rows(quick: bool) -> list[Row]:
 
 
 def tracker_rows(quick: bool) -> list[Row]:
-    """The whole tracker on a large scenario, and on the real recordings where they are."""
-    out = []
+    """The whole tracker on a real recording, where they are, and on large scenarios, which leave much memory behind."""
+    out = recording_rows(quick) if scoreboard.DATA.is_dir() else []
     # targets, seconds of data, seconds between two reports of one radar on one target: five radars see each
     sizes = [(400, 60.0, 10.0), (4000, 60.0, 10.0)]
     for targets, seconds, period in sizes if quick else [*sizes[:1], (4000, 300.0, 10.0), (100_000, 20.0, 5.0)]:
         value = whole_tracker.measure(targets, seconds, period)["times_real_time"]
         work = f"whole tracker, {targets} targets, {int(5 * targets / period)} reports/s"
         out.append(row(work, "boresight", value, "times real time"))
-    if scoreboard.DATA.is_dir():
-        data = {n: r for n, r in scoreboard.recordings(scoreboard.DATA).items() if n == 2}
-        config = scoreboard.configuration(data[2])
-        tracker, sensors = scoreboard.tracker_for(data[2], config, ["radar", "ir"]), ["radar", "ir"]
-        scans = list(scoreboard.iter_scans(data[2], sensors))
-        scoreboard.run(tracker, scans[:20])
-        contenders: Contenders = {"boresight": (lambda: scoreboard.run(tracker, scans), 1)}
-        work = "2-minute real recording, radar + IR"
-        out += rows_of(work, contenders, 3 if quick else 7, "ms", 1e3)
-        if not quick:  # once: it takes ten seconds
-            looks = recording.stone_soup_scans(data[2], scans)
-            peer = timed({"Stone Soup, nearest neighbours": (lambda: recording.stone_soup(looks), 1)}, 1)
-            out += [row(work, name, 1e3 * v, "ms", 1e3 * v / out[-1]["value"]) for name, v in peer.items()]
+    return out
+
+
+def recording_rows(quick: bool) -> list[Row]:
+    """Two minutes of radar and infrared, beside a tracker of Stone Soup's parts."""
+    data = {n: r for n, r in scoreboard.recordings(scoreboard.DATA).items() if n == 2}
+    config = scoreboard.configuration(data[2])
+    sensors = ["radar", "ir"]
+    tracker, scans = tracker_for(data[2], config, sensors), list(iter_scans(data[2], sensors))
+    run(tracker, scans[:20])
+    contenders: Contenders = {"boresight": (lambda: run(tracker, scans), 1)}
+    work = "2-minute real recording, radar + IR"
+    out = rows_of(work, contenders, 3 if quick else 7, "ms", 1e3)
+    if not quick:  # once: it takes ten seconds
+        looks = recording.stone_soup_scans(data[2], scans)
+        peer = timed({"Stone Soup, nearest neighbours": (lambda: recording.stone_soup(looks), 1)}, 1)
+        out += [row(work, name, 1e3 * v, "ms", 1e3 * v / out[0]["value"]) for name, v in peer.items()]
     return out
 
 
