@@ -97,9 +97,9 @@ class PoseTrack:
         recent = int(np.searchsorted(self.t, t - SLOPE_WINDOW))
         if not self.measured[recent:n].all():
             first = int(np.searchsorted(self.t, t - 3.0 * SLOPE_WINDOW))
-            slopes = kernel.slopes(self.t[first:n], self.position[first:n], SLOPE_WINDOW)
+            slopes = kernel.slopes(self.t[first:n], self.position[first:n], SLOPE_WINDOW, recent - first)
             velocity = velocity.copy()
-            velocity[recent:] = np.where(self.measured[recent:n, None], velocity[recent:], slopes[recent - first :])
+            velocity[recent:] = np.where(self.measured[recent:n, None], velocity[recent:], slopes)
         return replace(
             self, t=self.t[:n], position=self.position[:n], velocity=velocity, measured=self.measured[:n],
             hermite=self.hermite[: max(n - 1, 0)], t_attitude=self.t_attitude[:m], quaternion=self.quaternion[:m],
@@ -166,7 +166,7 @@ def pose_track(
     measured: NDArray[np.bool_] = np.asarray(np.isfinite(platform.velocity[have]).all(axis=1))
     velocity = platform.velocity[have].copy()
     if not measured.all():
-        velocity[~measured] = kernel.slopes(t, position, SLOPE_WINDOW)[~measured]
+        velocity[~measured] = kernel.slopes(t, position, SLOPE_WINDOW, 0)[~measured]
     turned = np.isfinite(platform.ypr).all(axis=1) & np.isfinite(platform.t)
     t_attitude = np.ascontiguousarray(platform.t[turned])
     quaternion = _attitudes(platform.ypr[turned], t_attitude, t, position, velocity, site)

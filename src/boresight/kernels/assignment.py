@@ -75,6 +75,8 @@ def assign_sparse(start: IntArray, column: IntArray, cost: FloatArray, n_columns
     for i in range(n_rows):
         col_of_row[i] = -1
     for first in range(n_rows):
+        if start[first] == start[first + 1]:
+            continue  # no candidates: alone
         n_touched = 0
         size = 0
         row = first

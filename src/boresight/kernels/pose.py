@@ -219,14 +219,17 @@ def first_uncovered(nodes: FloatArray, t: FloatArray, max_gap: float, max_extrap
 
 
 @njit(cache=True)
-def slopes(nodes: FloatArray, position: FloatArray, window: float) -> FloatArray:
-    """Return velocities (n, 3): least-squares slopes over the nodes within ±window (s), at least the neighbours."""
+def slopes(nodes: FloatArray, position: FloatArray, window: float, begin: int) -> FloatArray:
+    """Return velocities (n - begin, 3) at the nodes from `begin` on.
+
+    Least-squares slopes over the nodes within ±window (s), at least the neighbours.
+    """
     n = len(nodes)
-    v = np.zeros((n, 3))
+    v = np.zeros((n - begin, 3))
     if n == 1:
         return v
     first, last = 0, 0
-    for k in range(n):
+    for k in range(begin, n):
         while nodes[k] - nodes[first] > window:
             first += 1
         while last + 1 < n and nodes[last + 1] - nodes[k] <= window:
@@ -241,7 +244,7 @@ def slopes(nodes: FloatArray, position: FloatArray, window: float) -> FloatArray
             dt = nodes[m] - nodes[k] - mean
             total += dt * dt
             for c in range(3):
-                v[k, c] += dt * (position[m, c] - position[k, c])
+                v[k - begin, c] += dt * (position[m, c] - position[k, c])
         for c in range(3):
-            v[k, c] /= total
+            v[k - begin, c] /= total
     return v

@@ -55,11 +55,12 @@ def known_positions(
         fitted = velocity[base:n]
         if n < len(nodes) and not measured[recent:n].all():
             start = np.searchsorted(nodes, known[i] - 3.0 * window)
-            slope = slopes(nodes[start:n], position[start:n], window)
+            begin = max(recent, base)
+            slope = slopes(nodes[start:n], position[start:n], window, begin - start)
             fitted = fitted.copy()
-            for j in range(max(recent, base), n):
+            for j in range(begin, n):
                 if not measured[j]:
-                    fitted[j - base] = slope[j - start]
+                    fitted[j - base] = slope[j - begin]
         found = interpolate_position(nodes[base:n], position[base:n], fitted, hermite[base : max(n - 1, base)], times)
         p[first[i] : first[i + 1]] = found[0]
         v[first[i] : first[i + 1]] = found[1]

@@ -13,7 +13,7 @@ from boresight.kernels.registration import TIME
 from boresight.kernels.tracker import GATED, UNASSOCIATED, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_clutter import log_densities
 from boresight.kernels.tracker_place import Places, fix_sensitivity
-from boresight.kernels.tracker_state import components, existence, innovation, linearise
+from boresight.kernels.tracker_state import components, existence, innovation, linearise, log_determinant
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
@@ -113,8 +113,7 @@ def gate_all(
         if p_d[i] <= 0.0:
             continue
         there = existence(tr, i, s)
-        log_hit = math.log(there * p_d[i])
-        log_miss = math.log(1.0 - there * p_d[i])
+        log_hit = log_miss = 0.0  # filled where they are needed: most tracks have no candidate
         last_pose, last_kind = -1, 0
         first, last = 0, m
         reach = np.inf
@@ -135,7 +134,7 @@ def gate_all(
             if kind != last_kind or look.dt[k] != look.dt[last_pose]:
                 linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, c, room)
                 last_pose, last_kind = k, kind
-            nis, logdet = innovation(tr.P[i], look.z[k], look.R[k], c, room, s.d, sensor.constant[TIME])
+            nis = innovation(tr.P[i], look.z[k], look.R[k], c, room, s.d, sensor.constant[TIME])
             if nis < near[k]:
                 near[k] = nis
                 if nis > s.gates[c]:
@@ -152,7 +151,9 @@ def gate_all(
                 cost, distance, loglik = grown(cost, size), grown(distance, size), grown(loglik, size)
             column[used] = k
             distance[used] = nis
-            loglik[used] = -0.5 * (nis + logdet + c * LOG_2PI) - log_density[k]
+            if used == start[i]:
+                log_hit, log_miss = math.log(there * p_d[i]), math.log(1.0 - there * p_d[i])
+            loglik[used] = -0.5 * (nis + log_determinant(c, room) + c * LOG_2PI) - log_density[k]
             cost[used] = log_miss - (log_hit + loglik[used])
             used += 1
     start[n_tracks] = used

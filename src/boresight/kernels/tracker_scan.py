@@ -178,7 +178,9 @@ def detection_probability(x: FloatArray, d: int, look: Look, sensor: SensorTable
     if not within(range_m, math.nan, math.nan, sensor, 0.0):  # angles only where needed: they cost most
         return 0.0
     azimuth = math.atan2(d0, d1) if sensor.azimuth_span < 2.0 * math.pi else math.nan
-    if not within(range_m, azimuth, math.atan2(d2, math.hypot(d0, d1)), sensor, 0.0):
+    limited = sensor.elevation_low > -0.5 * math.pi or sensor.elevation_high < 0.5 * math.pi
+    elevation = math.atan2(d2, math.hypot(d0, d1)) if limited else math.nan
+    if not within(range_m, azimuth, elevation, sensor, 0.0):
         return 0.0
     p = sensor.p_detection
     if math.isfinite(sensor.fade_range):

@@ -145,10 +145,8 @@ def whiten(y: FloatArray, L: FloatArray, m: int) -> None:
 
 
 @njit(**LEAF)
-def innovation(
-    P: FloatArray, z: FloatArray, R: FloatArray, m: int, room: Workroom, d: int, lag: int
-) -> tuple[float, float]:
-    """Fill `y`, the Cholesky factor of S in `S` and P H' in `PHt` of `room`; return (NIS, log determinant of S).
+def innovation(P: FloatArray, z: FloatArray, R: FloatArray, m: int, room: Workroom, d: int, lag: int) -> float:
+    """Fill `y`, the Cholesky factor of S in `S` and P H' in `PHt` of `room`; return the NIS.
 
     Of the m components in `room.mask`, predicted by `linearise`.
 
@@ -166,15 +164,17 @@ def innovation(
         if c == 1 or c == 2:
             y[i] = wrap(y[i])
         for a in range(n):
-            acc = 0.0
-            for b in range(n):
-                acc += P[a, b] * H[c, b]
-            PHt[a, i] = acc
+            PHt[a, i] = 0.0
+        for b in range(n):
+            if H[c, b] != 0.0:  # most states do not show in a component
+                for a in range(n):
+                    PHt[a, i] += P[a, b] * H[c, b]
     for i in range(m):
         for j in range(i + 1):
             acc = R[mask[i], mask[j]]
             for a in range(n):
-                acc += H[mask[i], a] * PHt[a, j]
+                if H[mask[i], a] != 0.0:
+                    acc += H[mask[i], a] * PHt[a, j]
             if lag >= 0:
                 for a in range(d):
                     for b in range(d):
@@ -184,11 +184,18 @@ def innovation(
     factor(S, m)
     whiten(y, S, m)
     nis = 0.0
-    logdet = 0.0
     for i in range(m):
         nis += y[i] * y[i]
-        logdet += 2.0 * math.log(S[i, i])
-    return nis, logdet
+    return nis
+
+
+@njit(**LEAF)
+def log_determinant(m: int, room: Workroom) -> float:
+    """Return the log determinant of S, of m components, as `innovation` leaves its factor in `room`."""
+    total = 0.0
+    for i in range(m):
+        total += 2.0 * math.log(room.S[i, i])
+    return total
 
 
 @njit(**LEAF)
