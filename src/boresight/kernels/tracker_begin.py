@@ -26,7 +26,7 @@ from boresight.kernels.tracker import (
 )
 from boresight.kernels.tracker_place import Places, fix_sensitivity
 from boresight.kernels.tracker_state import apply_update, innovation, linearise
-from boresight.kernels.tracker_workroom import workroom
+from boresight.kernels.tracker_workroom import Workroom
 from boresight.kernels.write import write_matrix, write_vector
 from boresight.types.sensor import FloatArray
 
@@ -42,6 +42,7 @@ def begin(
     row_of_col: IntArray,
     usable: NDArray[np.bool_],
     at: Places,
+    room: Workroom,
     extras: Extras,
 ) -> None:
     """Begin a track at every detection with a position that no track took."""
@@ -89,7 +90,7 @@ def begin(
                 P[a, b] = acc + shared + ((dt * s.speed_sigma) ** 2 if a == b else 0.0)
                 tr.anchor_P[i, a, b] = acc
         if extras is not None and sensor.registers:
-            apply_constants(tr, i, s, look, k, sensor, fix, J, mask)
+            apply_constants(tr, i, s, look, k, sensor, fix, J, mask, room)
         density = tr.clutter[sensor.number, AZIMUTH_BINS]
         born = max(expected / (expected + density), 5.0 * s.delete_below)
         w = tr.weight[i]
@@ -100,7 +101,7 @@ def begin(
         fate[k] = INITIATED
         owner[k] = look.row[k]
         if math.isfinite(look.z[k, 3]):
-            condition_on_rate(tr, i, s, sensor, look, k)
+            condition_on_rate(tr, i, s, sensor, look, k, room)
 
 
 @njit(**LEAF)
@@ -167,13 +168,13 @@ def apply_constants(
     fix: FloatArray,
     J: FloatArray,
     mask: IntArray,
+    room: Workroom,
 ) -> None:
     """Take the constant errors off a new track's position, with their covariance: pos = fix - C e, e the errors."""
     d = s.d
     n = tr.x.shape[1]
     first = n - s.n_constant
     x, P = tr.x[i], tr.P[i]
-    room = workroom(n)
     fix_sensitivity(look, k, fix, J, mask, (0.0, 0.0, 0.0), room)
     C = room.C
     full = np.zeros((d, n))
@@ -221,11 +222,9 @@ def save_lesson(tr: Tracks, i: int, s: Settings) -> None:
 
 
 @njit(**PART)
-def condition_on_rate(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int) -> None:
+def condition_on_rate(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int, room: Workroom) -> None:
     """Give a new track what its first range rate tells of the velocity."""
-    n = tr.x.shape[1]
-    room = workroom(n)
     room.mask[0] = 3
     linearise(tr.x[i], s.d, k, 0.0, look, sensor, 1, room)
     innovation(tr.P[i], look.z[k], look.R[k], 1, room, s.d, sensor.constant[TIME])
-    apply_update(tr.x[i], tr.P[i], 1, room, n - s.n_constant)
+    apply_update(tr.x[i], tr.P[i], 1, room, tr.x.shape[1] - s.n_constant)

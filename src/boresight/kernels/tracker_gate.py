@@ -105,8 +105,10 @@ def gate_all(
     most = log_densities(tr, s, sensor, look, log_density)
     spread, dt_high = spread_of(s, sensor, look, usable, at, room)
     near_only = math.isfinite(spread)
-    order = np.argsort(at.fix[:, 0]) if near_only else np.arange(m)
-    east, north = at.fix[order, 0], at.fix[order, 1]
+    order, east, north = np.arange(m), near, near
+    if near_only:
+        order = np.argsort(at.fix[:, 0])
+        east, north = at.fix[order, 0], at.fix[order, 1]
     used = 0
     for i in range(n_tracks):
         start[i] = used

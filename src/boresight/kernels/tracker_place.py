@@ -143,12 +143,13 @@ def covered(z: FloatArray, sensor: SensorTable) -> bool:
 
 @njit(**PART)
 def places_of(look: Look, s: Settings, sensor: SensorTable, usable: NDArray[np.bool_]) -> Places:
-    """Return where all usable detections of a look lie."""
-    m = len(look.dt)
-    there = np.zeros(m, np.bool_)
+    """Return where all usable detections of a look lie; no room for places if its sensor gives none."""
+    there = np.zeros(len(look.dt), np.bool_)
+    m = len(look.dt) if sensor.ranging else 0
     mask = np.zeros((m, 3), np.int64)
-    fix, J, R, cov = np.zeros((m, 3)), np.zeros((m, 3, 3)), np.zeros((m, 3, 3)), np.zeros((m, 3, 3))
-    for k in range(m if sensor.ranging else 0):
+    fix, matrices = np.zeros((m, 3)), np.zeros((3, m, 3, 3))
+    J, R, cov = matrices[0], matrices[1], matrices[2]
+    for k in range(m):
         if not usable[k] or position_fix(look, k, s, sensor, fix[k], J[k], mask[k]) == 0:
             continue
         there[k] = True

@@ -31,7 +31,7 @@ from boresight.kernels.tracker_place import covered, places_of, within
 from boresight.kernels.tracker_split import begin_beside, keep_beside, unplaced
 from boresight.kernels.tracker_state import predict_all
 from boresight.kernels.tracker_weigh import evidence, follow_blob, merged, take, weigh
-from boresight.kernels.tracker_workroom import workroom
+from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
 
@@ -44,6 +44,7 @@ def scan_step(
     fate: IntArray,
     owner: IntArray,
     nis_of: FloatArray,
+    room: Workroom,
     extras: Extras,
 ) -> None:
     """Take one scan: predict, gate, assign, update, weigh, begin and end tracks; `fate`, `owner`, `nis_of` are (m,).
@@ -58,7 +59,6 @@ def scan_step(
     screen(look, sensor, usable, fate, owner, nis_of)
     at = places_of(look, s, sensor, usable)
     p_d = np.zeros(n_tracks)
-    room = workroom(tr.x.shape[1])
     for i in range(n_tracks):
         p_d[i] = detection_probability(tr.x[i], s.d, look, sensor)
     start, column, cost, distance, loglik = gate_all(tr, s, sensor, look, usable, at, p_d, room, fate, owner, nis_of)
@@ -109,7 +109,7 @@ def scan_step(
         keep_beside(tr, s, sensor, look, col_of_row, usable, room)
     learn_clutter(tr, s, sensor, look, claims, row_of_col, usable)
     if sensor.ranging:
-        begin(tr, s, sensor, look, fate, owner, row_of_col, usable, at, extras)
+        begin(tr, s, sensor, look, fate, owner, row_of_col, usable, at, room, extras)
         show(tr, s, sensor, look, extras)
     elif extras is not None and s.blob_share > 0.0:
         begin_beside(tr, s, sensor, look, fate, owner, usable, room)

@@ -27,6 +27,7 @@ from boresight.kernels.tracker_rows import (
     times_due,
 )
 from boresight.kernels.tracker_scan import scan_step
+from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
 COPY_INTERVAL = 0.5  # s of validity between two copies of the tracks
@@ -66,6 +67,7 @@ def advance(
     period: FloatArray,
     coast_after: float,
     rows: RowTable,
+    room: Workroom,
     extras: Extras,
 ) -> int:
     """Take looks in order of arrival, in place; returns the place of the first for which there was no room.
@@ -78,6 +80,7 @@ def advance(
         length: of the window (s).
         clock, period, coast_after: when rows are due (`tracker_rows`).
         rows: gets the rows due on the way.
+        room: written over.
         extras: as `tracker_scan.scan_step` takes it.
     """
     order = queue.order
@@ -117,7 +120,8 @@ def advance(
                 keep(copies, tr, looks.t[next_], looks.number[next_])
             a, b = looks.first[next_], looks.first[next_ + 1]
             sensor = sensor_at(sensors, looks.sensor[next_])
-            scan_step(tr, s, sensor, look_at(looks, next_), fates.code[a:b], fates.owner[a:b], fates.nis[a:b], extras)
+            fate = fates.code[a:b], fates.owner[a:b], fates.nis[a:b]
+            scan_step(tr, s, sensor, look_at(looks, next_), *fate, room, extras)
     return len(looks.t)
 
 

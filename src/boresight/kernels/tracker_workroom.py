@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from boresight.kernels.registration import N_PARAMETERS
 from boresight.kernels.tracker import IntArray
@@ -32,7 +31,6 @@ class Workroom(NamedTuple):
     C: FloatArray  # (3, 5) the world position by them
 
 
-@njit(cache=True)
 def workroom(n: int) -> Workroom:
     """Return the arrays for states of length n."""
     return Workroom(

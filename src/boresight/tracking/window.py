@@ -27,6 +27,7 @@ from boresight.kernels.tracker_looks import (
 )
 from boresight.kernels.tracker_rows import GAPS_KEPT, Clock, RowTable, row_table, rows_with_room
 from boresight.kernels.tracker_window import TAKEN, Fates, Queue, advance
+from boresight.kernels.tracker_workroom import workroom
 from boresight.tracking.core import Plan, copy_tracks
 from boresight.types import FloatArray
 
@@ -81,11 +82,11 @@ def take(
     every, fates = front(window.looks, total), window.fates
     queue = Queue(np.concatenate([window.order, np.zeros(new, np.int64)]), np.full(1, held), np.zeros(4, np.int64))
     rows = row_table(64 + 8 * int(window.tracks.live[0]), plan.settings.d)
-    done = total - new
+    done, room = total - new, workroom(plan.n_states)
     while True:
         done = advance(
             window.tracks, window.copies, plan.empty, plan.settings, plan.columns, every, fates, queue, done, length,
-            window.clock, period, coast_after, rows, plan.extras,
+            window.clock, period, coast_after, rows, room, plan.extras,
         )  # fmt: skip
         if done == total:
             break
