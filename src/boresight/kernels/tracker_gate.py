@@ -104,7 +104,7 @@ def gate_all(
     log_density = np.empty(m)
     most = log_densities(tr, s, sensor, look, log_density)
     spread, dt_high = spread_of(s, sensor, look, usable, at, room)
-    near_only = math.isfinite(spread)
+    near_only = m > 0 and math.isfinite(spread)
     order, east, north = np.arange(m), near, near
     if near_only:
         order = np.argsort(at.fix[:, 0])

@@ -105,13 +105,13 @@ def scan_step(
         else:
             log_any = evidence(i, start, column, loglik, row_of_col, p_d[i])
             weigh(tr, i, log_any, log_any, temper)
-    if extras is not None and s.blob_share > 0.0:
+    if extras is not None and s.blob_share > 0.0 and unplaced(tr):
         keep_beside(tr, s, sensor, look, col_of_row, usable, room)
     learn_clutter(tr, s, sensor, look, claims, row_of_col, usable)
     if sensor.ranging:
         begin(tr, s, sensor, look, fate, owner, row_of_col, usable, at, room, extras)
         show(tr, s, sensor, look, extras)
-    elif extras is not None and s.blob_share > 0.0:
+    elif extras is not None and s.blob_share > 0.0 and m > 1:
         begin_beside(tr, s, sensor, look, fate, owner, usable, room)
     end_and_merge(tr, s, sensor.ranging, start, extras)
     tr.live[1] += 1

@@ -57,8 +57,6 @@ def begin_beside(
     blob's range with half its size as spread. Nothing begins where another track nearby accounts for the bearing.
     """
     last = len(look.dt)
-    if last < 2:
-        return
     z = room.z
     for host in range(tr.live[0]):
         if tr.life[host, 2] == 0.0 or tr.heard[host] == 0 or accompanied(tr, host, s):
@@ -169,8 +167,6 @@ def keep_beside(
     Their place relative to it (`anchor`) is measured by the difference of two bearings of one look, in which what both
     have in common cancels. One that is not beside it any more, or would be one with it, is nothing.
     """
-    if not unplaced(tr):
-        return
     z = room.z
     for i in range(tr.live[0]):
         if tr.heard[i] != 0:
