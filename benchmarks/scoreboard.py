@@ -96,8 +96,13 @@ def unlimited(config: TrackerConfig) -> TrackerConfig:
     return dataclasses.replace(config, sensors=open_)
 
 
-def scored(data: dict[int, Recording], config: TrackerConfig, sensors: list[str]) -> tuple[list[Score], list[float]]:
-    """Track and score every recording; with a smoothing lag in the settings the smoothed tracks. CPU seconds beside."""
+def scored(
+    data: dict[int, Recording], config: TrackerConfig, sensors: list[str], clock: list[str] | None = None
+) -> tuple[list[Score], list[float]]:
+    """Track and score every recording; with a smoothing lag in the settings the smoothed tracks. CPU seconds beside.
+
+    The scores run from the first to the last report of the sensors `clock` (those used).
+    """
     scores, seconds = [], []
     for recording in data.values():
         tracker, scans = tracker_for(recording, config, sensors), list(iter_scans(recording, sensors))
@@ -107,7 +112,9 @@ def scored(data: dict[int, Recording], config: TrackerConfig, sensors: list[str]
         watch = None if config.smoothing_lag is None else lambda _, out: past.extend(out.smoothed)  # noqa: B023
         _, made, _ = run(tracker, scans, watch=watch)  # watched, it goes look by look
         seconds.append(time.process_time() - started)
-        scores.append(score(recording, track_rows(made if config.smoothing_lag is None else past), None, sensors))
+        scores.append(
+            score(recording, track_rows(made if config.smoothing_lag is None else past), None, clock or sensors)
+        )
     return scores, seconds
 
 
@@ -116,11 +123,16 @@ def rows(folder: Path, keep: dict[str, list[Score]] | None = None) -> list[dict[
     data = recordings(folder)
     config = configuration(next(iter(data.values())))
     out: list[dict[str, Any]] = []
-    cases = [(name, config, sensors) for name, sensors in COMBINATIONS.items()]
-    cases.append(("all, range not limited", unlimited(config), COMBINATIONS["all"]))
-    cases.append(("all, smoothed 6 s later", dataclasses.replace(config, smoothing_lag=6.0), COMBINATIONS["all"]))
-    for name, settings, sensors in cases:
-        scores, seconds = scored(data, settings, sensors)
+    every = COMBINATIONS["all"]
+    cases = [(name, config, sensors, sensors) for name, sensors in COMBINATIONS.items()]
+    cases += [
+        (f"{few}, over the time of {many}", config, COMBINATIONS[few], COMBINATIONS[many])
+        for few, many in (("radar", "radar + ir"), ("radar + lidar", "all"))
+    ]
+    cases.append(("all, range not limited", unlimited(config), every, every))
+    cases.append(("all, smoothed 6 s later", dataclasses.replace(config, smoothing_lag=6.0), every, every))
+    for name, settings, sensors, clock in cases:
+        scores, seconds = scored(data, settings, sensors, clock)
         if keep is not None:
             keep[name] = scores
         each = {f"scenario_{n}": float(np.sqrt((s.gospa[:, 0] ** 2).mean())) for n, s in zip(data, scores, strict=True)}
