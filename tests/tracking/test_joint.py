@@ -104,7 +104,19 @@ def test_the_mixture_is_that_of_probabilistic_data_association() -> None:
     A = np.array([[3.0, 0.5, 1.0, 0.0], [0.5, 4.0, 0.0, 1.0], [1.0, 0.0, 2.0, 0.2], [0.0, 1.0, 0.2, 2.0]])
     tr.x[0], tr.P[0] = x, A
     tr.weight[0] = 0.6, 0.1, 0.2, 0.1
-    mix(tr, 0, plan.settings, plan.sensors[0], look, workroom(4), np.array([0, 2]), np.array([0, 1]), share, visible)
+    mix(
+        tr,
+        0,
+        plan.settings,
+        plan.sensors[0],
+        look,
+        workroom(4),
+        np.array([0, 2]),
+        np.array([0, 1]),
+        share,
+        visible,
+        None,
+    )
     H = np.eye(2, 4)
     S = H @ A @ H.T + 4.0 * np.eye(2)
     K = A @ H.T @ np.linalg.inv(S)
@@ -134,7 +146,7 @@ def test_shares_weigh_the_hypotheses_and_only_the_own_detection_counts(own: int)
     moving = [multivariate_normal.pdf(z, tr.x[0, :2], tr.P[0, :2, :2] + 4.0 * np.eye(2)) for z in points]
     static = [multivariate_normal.pdf(z, anchor, A + 4.0 * np.eye(2)) for z in points]
     start, column = np.array([0, 2]), np.array([0, 1])
-    TAKE_SHARES(tr, 0, plan.settings, sensor, look, at, room, start, column, share, own, p_d, 1.0)
+    TAKE_SHARES(tr, 0, plan.settings, sensor, look, at, room, start, column, share, own, p_d, 1.0, None)
     visible = 1.0 - p_d + share.sum()
     still = 1.0 - p_d + share @ np.divide(static, moving)
     after = before * [visible, 1.0, still, 1.0]
@@ -177,7 +189,7 @@ def test_a_blob_places_no_better_than_its_size() -> None:
     tr.P[0] = np.diag([900.0, 25.0, 1.0, 1.0])
     fix = np.array([100.0 + 8.0, 0.0, 0.0])  # seen from the origin: east is the line of sight
     for _ in range(3):  # as often as it likes
-        follow_blob(tr, 0, plan.settings, plan.sensors[0], look_at(fix[None, :2]), fix, 0)
+        follow_blob(tr, 0, plan.settings, plan.sensors[0], look_at(fix[None, :2]), fix, 0, None)
     # along: variance 900 to (20 / 2)² = 100, the mean by the gain 1 - 100 / 900; across is known better already
     assert tr.P[0, 0, 0] == pytest.approx(100.0)
     assert tr.x[0, 0] == pytest.approx(100.0 + 8.0 * (1.0 - 100.0 / 900.0))

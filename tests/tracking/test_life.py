@@ -209,7 +209,7 @@ def test_where_many_detections_are_in_the_gate_a_track_needs_more_to_live(crowd:
     used = tracker(delete_below=0.01)
     tr = after(used, [[300.0, 400.0]]).window.tracks
     tr.weight[0] = 0.025, 0.0, 0.0, 0.975
-    END_AND_MERGE(tr, used.plan.settings, False, np.array([0, crowd]), None)
+    END_AND_MERGE(tr, used.plan.settings, False, np.array([0, crowd]), None, None)
     assert tr.live[0] == left
 
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boresight.kernels.tracker import INITIATED, NOTHING, UNASSOCIATED, Look, Tracks
-from boresight.kernels.tracker_copies import EACH, WHOLE, copies_with_room, keep, no_copies, restore
+from boresight.kernels.tracker import INITIATED, NOTHING, UNASSOCIATED, Look, Models, Tracks
+from boresight.kernels.tracker_copies import EACH, WHOLE, copies_with_room, each_of, keep, no_copies, restore
 from boresight.kernels.tracker_end import move
 from boresight.kernels.tracker_split import begin_beside, keep_beside
 from boresight.kernels.tracker_workroom import workroom
@@ -26,6 +26,7 @@ RESTORE = whole(restore)
 MOVE = whole(move)
 BEGIN_BESIDE = whole(begin_beside)
 KEEP_BESIDE = whole(keep_beside)
+MODELS = pytest.mark.parametrize("models", [None, Models(q=4.0, every=60.0, lasts=10.0)], ids=["one", "two"])
 
 
 def sensor(name: str, kind: SensorKind = SensorKind.RADAR, **extra: Any) -> Sensor:
@@ -57,36 +58,39 @@ def bearings(azimuth: list[float]) -> Look:
     return Look(0.0, np.zeros(m), z, R, np.arange(m), zero, zero, np.tile(np.eye(3), (m + 1, 1, 1)))
 
 
-def filled(seed: int, n: int) -> Tracks:
+def filled(seed: int, n: int, models: Models | None) -> Tracks:
     """Tracks in which every number of every field is different; n of them live, with room for one more."""
     errors = {"a": SensorErrors(bias_position=1.0, offset_time=0.1)}
-    plan = make_plan(TrackerConfig(sensors=errors), (sensor("a"), sensor("b")), 2)
+    config = TrackerConfig(q_manoeuvre=None if models is None else models.q, sensors=errors)
+    plan = make_plan(config, (sensor("a"), sensor("b")), 2)
     rng = np.random.default_rng(seed)
     tracks = empty_window(plan).tracks
-    for array in tracks:
+    for array in (a for a in tracks if a is not None):
         array[...] = rng.integers(1, 1_000_000_000, array.shape)
     tracks.live[0] = n
     return tracks
 
 
-def test_a_copy_holds_all_there_is_of_the_tracks() -> None:
-    tracks, other = filled(1, 3), filled(2, 5)
+@MODELS
+def test_a_copy_holds_all_there_is_of_the_tracks(models: Models | None) -> None:
+    tracks, other = filled(1, 3, models), filled(2, 5, models)
     expected = copy_tracks(tracks)
     copies = copies_with_room(no_copies(tracks), 2, 10)
-    KEEP(copies, tracks, 7.0, 4)
-    RESTORE(copies, 0, other)
+    KEEP(copies, tracks, 7.0, 4, models)
+    RESTORE(copies, 0, other, models)
     for name in WHOLE:
         np.testing.assert_array_equal(getattr(other, name), getattr(expected, name), err_msg=name)
-    for name in EACH:
+    for name in each_of(tracks):
         np.testing.assert_array_equal(getattr(other, name)[:3], getattr(expected, name)[:3], err_msg=name)
     assert set(WHOLE) | set(EACH) == set(Tracks._fields)
 
 
-def test_a_track_moves_with_all_that_it_is() -> None:
-    tracks = filled(3, 4)
+@MODELS
+def test_a_track_moves_with_all_that_it_is(models: Models | None) -> None:
+    tracks = filled(3, 4, models)
     expected = copy_tracks(tracks)
-    MOVE(tracks, 3, 1)
-    for name in EACH:
+    MOVE(tracks, 3, 1, models)
+    for name in each_of(tracks):
         np.testing.assert_array_equal(getattr(tracks, name)[1], getattr(expected, name)[3], err_msg=name)
 
 
@@ -101,11 +105,13 @@ def test_a_track_begun_where_nobody_can_see_it_again_does_not_wait() -> None:
     assert state.window.tracks.live[0] == 0
 
 
-def beside(stale: float = 0.0, azimuth: float = 0.12) -> tuple[Plan, Tracks, list[int]]:
+def beside(stale: float = 0.0, azimuth: float = 0.12, models: Models | None = None) -> tuple[Plan, Tracks, list[int]]:
     """Two bearings at a shown track 150 m north, whose row 1 was another track's before; returns the fates too."""
     radar, eye = sensor("r"), sensor("e", SensorKind.OPTICAL)
     errors = {"r": SensorErrors(resolution=25.0, offset_time=0.5, offset_azimuth=0.02)}
-    plan = make_plan(TrackerConfig(blob_share=0.1, merge_distance=12.0, sensors=errors), (radar, eye), 2)
+    q = None if models is None else models.q
+    config = TrackerConfig(q_manoeuvre=q, blob_share=0.1, merge_distance=12.0, sensors=errors)
+    plan = make_plan(config, (radar, eye), 2)
     tracks = empty_window(plan).tracks
     n = plan.n_states
     tracks.live[0] = 1
@@ -113,11 +119,13 @@ def beside(stale: float = 0.0, azimuth: float = 0.12) -> tuple[Plan, Tracks, lis
     tracks.x[0, 1], tracks.heard[0], tracks.birth[0] = 150.0, 1, 77
     tracks.life[0, 2], tracks.weight[0] = 1.0, (1.0, 0.0, 0.0, 0.0)
     tracks.told[0, :, :2] = np.eye(2) / 25.0
-    for name in EACH:
+    if models is not None:
+        tracks.mode[0], tracks.mode_x[0], tracks.mode_P[0] = (0.7, 0.3), tracks.x[0], tracks.P[0]
+    for name in each_of(tracks):
         getattr(tracks, name)[1] = stale
     fate, owner = np.full(2, UNASSOCIATED), np.full(2, -1)
     look, usable = bearings([0.0, azimuth]), np.ones(2, np.bool_)
-    BEGIN_BESIDE(tracks, plan.settings, plan.sensors[1], look, fate, owner, usable, workroom(n))
+    BEGIN_BESIDE(tracks, plan.settings, plan.sensors[1], look, fate, owner, usable, workroom(n), models)
     return plan, tracks, fate.tolist()
 
 
@@ -142,9 +150,10 @@ def test_a_bearing_too_near_or_beyond_the_blob_begins_nothing(azimuth: float) ->
     assert fates == [UNASSOCIATED, UNASSOCIATED]
 
 
-def test_nothing_is_left_of_the_track_that_had_the_row_before() -> None:
-    (_, fresh, _), (_, used, _) = beside(), beside(stale=3.0)
-    for name in EACH:
+@MODELS
+def test_nothing_is_left_of_the_track_that_had_the_row_before(models: Models | None) -> None:
+    (_, fresh, _), (_, used, _) = beside(models=models), beside(stale=3.0, models=models)
+    for name in each_of(fresh):
         np.testing.assert_array_equal(getattr(used, name)[1], getattr(fresh, name)[1], err_msg=name)
 
 
@@ -156,7 +165,9 @@ def test_a_second_track_ends_with_the_first_or_when_they_part(shown: float, away
     tracks.anchor[1, :2] = away, 0.0
     free, usable = np.full(2, -1), np.ones(2, np.bool_)
     tracks.x[0, :2] += 3.0
-    KEEP_BESIDE(tracks, plan.settings, plan.sensors[1], bearings([0.0, 0.12]), free, usable, workroom(plan.n_states))
+    KEEP_BESIDE(
+        tracks, plan.settings, plan.sensors[1], bearings([0.0, 0.12]), free, usable, workroom(plan.n_states), None
+    )
     assert (tracks.weight[1, NOTHING] < 1.0) == stays
     if stays:
         np.testing.assert_allclose(tracks.x[1, :2], tracks.x[0, :2] + [away, 0.0])  # along with the first

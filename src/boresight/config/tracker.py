@@ -16,6 +16,9 @@ DEG = math.pi / 180.0
 # key in the file -> (field, factor to SI)
 TRACKER_KEYS = {
     "process_noise_m2_s3": ("q", 1.0),
+    "manoeuvre_noise_m2_s3": ("q_manoeuvre", 1.0),
+    "manoeuvre_every_s": ("manoeuvre_every", 1.0),
+    "manoeuvre_lasts_s": ("manoeuvre_lasts", 1.0),
     "speed_sigma_m_s": ("speed_sigma", 1.0),
     "gate_probability": ("gate_probability", 1.0),
     "birth_rate": ("birth_rate", 1.0),
@@ -64,6 +67,9 @@ class TrackerTable(TableModel, frozen=True):
     """`[tracker]`; what is left out takes the default of `TrackerConfig`."""
 
     process_noise_m2_s3: float | None = None
+    manoeuvre_noise_m2_s3: float | None = None
+    manoeuvre_every_s: float | None = None
+    manoeuvre_lasts_s: float | None = None
     speed_sigma_m_s: float | None = None
     gate_probability: float | None = None
     birth_rate: float | None = None

@@ -2,13 +2,14 @@
 
 A track is a row of the arrays in `Tracks`. Its state is position (d), velocity (d), one Gauss–Markov bias for each
 component of each sensor whose errors are declared to be coloured, then the sensors' constant errors that are to be
-learned. Beside it stand four weights, the probabilities that the track is (0) a target that the sensors can see, (1) a
+learned. Where manoeuvres are followed, each of two levels of process noise has such a state of its own too. Beside it
+stand four weights, the probabilities that the track is (0) a target that the sensors can see, (1) a
 target hidden from them, (2) an object that does not move, (3) nothing at all.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ IntArray = NDArray[np.int64]
 # of constant errors, shared detections, second bearings: None leaves what few recordings need out of the compiled code,
 # which takes half as long then
 Extras = bool | None
+PerModel = Any  # FloatArray; None where targets move by one model, which leaves it out of the compiled code
 
 VISIBLE, HIDDEN, STATIC, NOTHING = 0, 1, 2, 3
 # codes of what became of a detection
@@ -46,6 +48,9 @@ class Tracks(NamedTuple):
     bank: FloatArray  # (k, k + 1) what ended tracks had learned of them
     undetected: FloatArray  # (1,) expected number of targets that no track follows yet
     seen_range: FloatArray  # (n_sensors,) m, longest range so far (stands in for a coverage without end)
+    mode: PerModel = None  # (cap, 2) probabilities of the models of motion, and
+    mode_x: PerModel = None  # (cap, 2, n) their states, of which x and P are the moments
+    mode_P: PerModel = None  # (cap, 2, n, n)
 
 
 class Look(NamedTuple):
@@ -114,3 +119,14 @@ class Settings(NamedTuple):
     clutter_memory: float  # looks
     blob: float  # m, the largest resolution of the ranging sensors in use
     blob_share: float  # probability that a second bearing beside a shown track is a second target in its blob
+
+
+class Models(NamedTuple):
+    """The second model of a target's motion, where there is one: it manoeuvres now and then.
+
+    None in its place leaves it out of the compiled code.
+    """
+
+    q: float  # m²/s³, process noise during a manoeuvre (`Settings.q`: between them)
+    every: float  # s, mean time from one's end to the next
+    lasts: float  # s, mean time it lasts

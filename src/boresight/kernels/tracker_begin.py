@@ -20,10 +20,12 @@ from boresight.kernels.tracker import (
     Extras,
     IntArray,
     Look,
+    Models,
     SensorTable,
     Settings,
     Tracks,
 )
+from boresight.kernels.tracker_models import begin_models
 from boresight.kernels.tracker_place import Places, fix_sensitivity
 from boresight.kernels.tracker_state import apply_update, innovation, linearise
 from boresight.kernels.tracker_workroom import Workroom
@@ -44,6 +46,7 @@ def begin(
     at: Places,
     room: Workroom,
     extras: Extras,
+    models: Models | None,
 ) -> None:
     """Begin a track at every detection with a position that no track took."""
     d = s.d
@@ -102,6 +105,8 @@ def begin(
         owner[k] = look.row[k]
         if math.isfinite(look.z[k, 3]):
             condition_on_rate(tr, i, s, sensor, look, k, room)
+        if models is not None:
+            begin_models(tr, i, models)
 
 
 @njit(**LEAF)

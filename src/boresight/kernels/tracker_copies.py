@@ -9,11 +9,25 @@ from numba import njit
 from numpy.typing import NDArray
 
 from boresight.kernels.options import BARE, LEAF
-from boresight.kernels.tracker import IntArray, Tracks
+from boresight.kernels.tracker import IntArray, Models, PerModel, Tracks
 from boresight.types.sensor import FloatArray
 
 WHOLE = ("live", "time", "last_look", "clutter", "bank", "undetected", "seen_range")
-EACH = ("birth", "x", "P", "weight", "anchor", "anchor_P", "life", "heard", "beside", "told")
+EACH = (
+    "birth",
+    "x",
+    "P",
+    "weight",
+    "anchor",
+    "anchor_P",
+    "life",
+    "heard",
+    "beside",
+    "told",
+    "mode",
+    "mode_x",
+    "mode_P",
+)
 
 
 class Copies(NamedTuple):
@@ -42,6 +56,9 @@ class Copies(NamedTuple):
     heard: IntArray  # (N,)
     beside: IntArray  # (N,)
     told: FloatArray  # (N, k, k + 1)
+    mode: PerModel = None  # (N, 2)
+    mode_x: PerModel = None  # (N, 2, n)
+    mode_P: PerModel = None  # (N, 2, n, n)
 
 
 @njit(**LEAF)
@@ -68,8 +85,17 @@ def put3(target: Any, to: int, source: Any, at: int, n: int) -> None:
                 target[to + i, a, b] = source[at + i, a, b]
 
 
+@njit(**LEAF)
+def put_models(target: Any, to: int, source: Any, at: int, n: int) -> None:
+    """Copy what n tracks hold by model."""
+    put2(target.mode, to, source.mode, at, n)
+    put3(target.mode_x, to, source.mode_x, at, n)
+    for i in range(n):
+        put3(target.mode_P[to + i], 0, source.mode_P[at + i], 0, source.mode_P.shape[1])
+
+
 @njit(**BARE)
-def keep(copies: Copies, tr: Tracks, t: float, number: int) -> None:
+def keep(copies: Copies, tr: Tracks, t: float, number: int, models: Models | None) -> None:
     """Add a copy of the tracks as they are before the look `number` of time `t`; there must be room."""
     c = copies.used[0]
     n = tr.live[0]
@@ -95,10 +121,12 @@ def keep(copies: Copies, tr: Tracks, t: float, number: int) -> None:
     put1(copies.heard, a, tr.heard, 0, n)
     put1(copies.beside, a, tr.beside, 0, n)
     put3(copies.told, a, tr.told, 0, n)
+    if models is not None:
+        put_models(copies, a, tr, 0, n)
 
 
 @njit(**BARE)
-def restore(copies: Copies, c: int, tr: Tracks) -> None:
+def restore(copies: Copies, c: int, tr: Tracks, models: Models | None) -> None:
     """Make the tracks what copy c says; there must be room."""
     a = copies.first[c]
     n = copies.first[c + 1] - a
@@ -119,12 +147,19 @@ def restore(copies: Copies, c: int, tr: Tracks) -> None:
     put1(tr.heard, 0, copies.heard, a, n)
     put1(tr.beside, 0, copies.beside, a, n)
     put3(tr.told, 0, copies.told, a, n)
+    if models is not None:
+        put_models(tr, 0, copies, a, n)
+
+
+def each_of(item: Tracks | Copies) -> tuple[str, ...]:
+    """Return the names of those arrays with a row for each track that there are."""
+    return tuple(name for name in EACH if getattr(item, name) is not None)
 
 
 def no_copies(tr: Tracks) -> Copies:
     """Return none, of tracks like `tr`."""
     whole = {name: np.zeros((0, *getattr(tr, name).shape), getattr(tr, name).dtype) for name in WHOLE}
-    each = {name: getattr(tr, name)[:0].copy() for name in EACH}
+    each = {name: getattr(tr, name)[:0].copy() for name in each_of(tr)}
     return Copies(np.zeros(1, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(1, np.int64), **whole, **each)
 
 
@@ -132,13 +167,17 @@ def copies_with_room(copies: Copies, count: int, tracks: int) -> Copies:
     """Return the copies in arrays for at least `count` of them and so many tracks in all."""
     used = int(copies.used[0])
     few, many = (used, count), (int(copies.first[used]), tracks)
-    size = dict.fromkeys(("t", "number", *WHOLE), few) | {"first": (used + 1, count + 1)} | dict.fromkeys(EACH, many)
+    size = (
+        dict.fromkeys(("t", "number", *WHOLE), few)
+        | {"first": (used + 1, count + 1)}
+        | dict.fromkeys(each_of(copies), many)
+    )
     return Copies(used=copies.used, **{name: longer(getattr(copies, name), *n) for name, n in size.items()})
 
 
 def tracks_with_room(tr: Tracks, size: int) -> Tracks:
     """Return the tracks in arrays for at least `size` of them."""
-    return tr._replace(**{name: longer(getattr(tr, name), int(tr.live[0]), size) for name in EACH})
+    return tr._replace(**{name: longer(getattr(tr, name), int(tr.live[0]), size) for name in each_of(tr)})
 
 
 def longer(array: NDArray[Any], used: int, size: int) -> NDArray[Any]:
@@ -157,7 +196,7 @@ def drop_oldest(copies: Copies, c: int) -> None:
     for name in ("t", "number", *WHOLE):
         array = getattr(copies, name)
         array[: used - c] = array[c:used].copy()
-    for name in EACH:
+    for name in each_of(copies):
         array = getattr(copies, name)
         array[: b - a] = array[a:b].copy()
     copies.first[: used - c + 1] = copies.first[c : used + 1] - a
@@ -167,5 +206,5 @@ def drop_oldest(copies: Copies, c: int) -> None:
 def copy_at(copies: Copies, c: int) -> Tracks:
     """Return copy c as tracks; the arrays are views."""
     a, b = int(copies.first[c]), int(copies.first[c + 1])
-    parts = {name: getattr(copies, name)[c] for name in WHOLE} | {name: getattr(copies, name)[a:b] for name in EACH}
-    return Tracks(**parts)
+    each = {name: getattr(copies, name)[a:b] for name in each_of(copies)}
+    return Tracks(**each, **{name: getattr(copies, name)[c] for name in WHOLE})

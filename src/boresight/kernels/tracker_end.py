@@ -7,9 +7,20 @@ from numba import njit
 from numpy.typing import NDArray
 
 from boresight.kernels.options import LEAF, PART
-from boresight.kernels.tracker import HIDDEN, STATIC, VISIBLE, Extras, IntArray, Look, SensorTable, Settings, Tracks
+from boresight.kernels.tracker import (
+    HIDDEN,
+    STATIC,
+    VISIBLE,
+    Extras,
+    IntArray,
+    Look,
+    Models,
+    SensorTable,
+    Settings,
+    Tracks,
+)
 from boresight.kernels.tracker_begin import save_lesson
-from boresight.kernels.tracker_copies import put1, put2, put3
+from boresight.kernels.tracker_copies import put1, put2, put3, put_models
 
 
 @njit(**PART)
@@ -44,7 +55,9 @@ def stands_apart(tr: Tracks, i: int, s: Settings) -> bool:
 
 
 @njit(**PART)
-def end_and_merge(tr: Tracks, s: Settings, merging: bool, start: IntArray, extras: Extras) -> None:
+def end_and_merge(
+    tr: Tracks, s: Settings, merging: bool, start: IntArray, extras: Extras, models: Models | None
+) -> None:
     """Drop tracks that are probably nothing, and the weaker of two that have become one.
 
     `start` is the candidate list of this look: a track whose gate holds many detections needs the more weight to live,
@@ -67,13 +80,13 @@ def end_and_merge(tr: Tracks, s: Settings, merging: bool, start: IntArray, extra
     for i in range(n_tracks):
         if keep[i]:
             if at != i:
-                move(tr, i, at)
+                move(tr, i, at, models)
             at += 1
     tr.live[0] = at
 
 
 @njit(**LEAF)
-def move(tr: Tracks, i: int, to: int) -> None:
+def move(tr: Tracks, i: int, to: int, models: Models | None) -> None:
     """Put track i in the place of another."""
     put1(tr.birth, to, tr.birth, i, 1)
     put1(tr.heard, to, tr.heard, i, 1)
@@ -85,6 +98,8 @@ def move(tr: Tracks, i: int, to: int) -> None:
     put3(tr.P, to, tr.P, i, 1)
     put3(tr.anchor_P, to, tr.anchor_P, i, 1)
     put3(tr.told, to, tr.told, i, 1)
+    if models is not None:
+        put_models(tr, to, tr, i, 1)
 
 
 @njit(**PART)

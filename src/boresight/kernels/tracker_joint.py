@@ -13,9 +13,10 @@ from numba import njit
 
 from boresight.kernels.jpda import marginals
 from boresight.kernels.options import PART
-from boresight.kernels.tracker import HIDDEN, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
+from boresight.kernels.tracker import HIDDEN, VISIBLE, IntArray, Look, Models, SensorTable, Settings, Tracks
+from boresight.kernels.tracker_models import combine_models, manoeuvring
 from boresight.kernels.tracker_place import Places
-from boresight.kernels.tracker_state import condition, existence, learners
+from boresight.kernels.tracker_state import condition, existence, learners, look_along
 from boresight.kernels.tracker_weigh import moving_likelihood, note_hit, static_likelihood, weigh
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.kernels.write import write_matrix, write_vector
@@ -67,6 +68,7 @@ def take_shares(
     own: int,
     p_d: float,
     temper: float,
+    models: Models | None,
 ) -> None:
     """Condition track `i` on its shares of a look: hypotheses, and state as the mixture of what could have happened.
 
@@ -79,7 +81,7 @@ def take_shares(
         still += share[e] * still_ratio(tr, i, s, sensor, look, column[e], at, room, column[e] == own)
     moves = sensor.moves_tracks and (sensor.ranging or tr.heard[i] > 0)
     if moves:
-        mix(tr, i, s, sensor, look, room, start, column, share, visible)
+        mix(tr, i, s, sensor, look, room, start, column, share, visible, models)
     weigh(tr, i, math.log(visible), math.log(still), temper)
     if own >= 0:
         note_hit(tr, i, s, sensor, look.t + look.dt[own], moves)
@@ -124,31 +126,95 @@ def mix(
     column: IntArray,
     share: FloatArray,
     visible: float,
+    models: Models | None,
 ) -> None:
     """Replace a track's state by mean and covariance over what its target may have caused: a detection, or none."""
-    n = tr.x.shape[1]
     w = tr.weight[i]
     total = w[VISIBLE] * visible + w[HIDDEN]
     considered = learners(tr, i, s, sensor)
-    prior = tr.x[i].copy()
-    prior_P = tr.P[i].copy()
+    mine = column[start[i] : start[i + 1]]
+    beta = np.empty(len(mine))
+    for e in range(len(mine)):
+        beta[e] = w[VISIBLE] * share[start[i] + e] / max(total, 1e-300)
+        if beta[e] < LEAST_SHARE:
+            beta[e] = 0.0
+    if models is None:
+        mixture(tr.x[i], tr.P[i], s.d, look, sensor, room, mine, beta, considered)
+    else:
+        mix_by_model(tr, i, s.d, look, sensor, room, mine, beta, considered)
+
+
+@njit(cache=True)
+def mix_by_model(
+    tr: Tracks,
+    i: int,
+    d: int,
+    look: Look,
+    sensor: SensorTable,
+    room: Workroom,
+    mine: IntArray,
+    beta: FloatArray,
+    considered: int,
+) -> None:
+    """The same for both models: each detection weighs the models by its likelihood, a miss leaves them."""
+    n = len(mine)
+    own = np.zeros((2, n))  # probability of each model and detection together
+    left = 1.0
+    for e in range(n):
+        if beta[e] > 0.0:
+            _, log0 = look_along(tr.mode_x[i, 0], tr.mode_P[i, 0], d, mine[e], look, sensor, room)
+            _, log1 = look_along(tr.mode_x[i, 1], tr.mode_P[i, 1], d, mine[e], look, sensor, room)
+            manoeuvre = manoeuvring(tr.mode[i, 1], log1 - log0)
+            own[0, e], own[1, e] = (1.0 - manoeuvre) * beta[e], manoeuvre * beta[e]
+            left -= beta[e]
+    for j in range(2):
+        total = max(left, 0.0) * tr.mode[i, j]
+        for e in range(n):
+            total += own[j, e]
+        for e in range(n):
+            own[j, e] /= total
+        mixture(tr.mode_x[i, j], tr.mode_P[i, j], d, look, sensor, room, mine, own[j], considered)
+        tr.mode[i, j] = total
+    both = tr.mode[i, 0] + tr.mode[i, 1]
+    tr.mode[i, 0] /= both
+    tr.mode[i, 1] /= both
+    combine_models(tr, i)
+
+
+@njit(**PART)
+def mixture(
+    x: FloatArray,
+    P: FloatArray,
+    d: int,
+    look: Look,
+    sensor: SensorTable,
+    room: Workroom,
+    mine: IntArray,
+    beta: FloatArray,
+    considered: int,
+) -> None:
+    """Replace (x, P) by its moments over being conditioned on detection mine[e] with probability beta[e], or not."""
+    n = len(x)
+    prior, prior_P = x.copy(), P.copy()
+    after, after_P = x.copy(), P.copy()
     mean = np.zeros(n)
     square = np.zeros((n, n))  # second moments about the prior mean: no cancellation of large coordinates
     left = 1.0
-    for e in range(start[i], start[i + 1]):
-        beta = w[VISIBLE] * share[e] / max(total, 1e-300)
-        if beta < LEAST_SHARE:
+    for e in range(len(mine)):
+        if beta[e] == 0.0:
             continue
-        x, P = prior.copy(), prior_P.copy()
-        condition(x, P, s.d, column[e], look, sensor, room, considered)
+        write_vector(after, prior)
+        write_matrix(after_P, prior_P)
+        condition(after, after_P, d, mine[e], look, sensor, room, considered)
         for a in range(n):  # written out: expressions with whole arrays take seconds to compile
-            mean[a] += beta * (x[a] - prior[a])
+            mean[a] += beta[e] * (after[a] - prior[a])
             for b in range(a + 1):
-                square[a, b] += beta * (0.5 * (P[a, b] + P[b, a]) + (x[a] - prior[a]) * (x[b] - prior[b]))
-        left -= beta
+                both = (after[a] - prior[a]) * (after[b] - prior[b])
+                square[a, b] += beta[e] * (0.5 * (after_P[a, b] + after_P[b, a]) + both)
+        left -= beta[e]
     for a in range(n):
-        tr.x[i, a] = prior[a] + mean[a]
+        x[a] = prior[a] + mean[a]
         for b in range(a + 1):
             before = 0.5 * (prior_P[a, b] + prior_P[b, a])
-            tr.P[i, a, b] = square[a, b] + max(left, 0.0) * before - mean[a] * mean[b]
-            tr.P[i, b, a] = tr.P[i, a, b]
+            P[a, b] = square[a, b] + max(left, 0.0) * before - mean[a] * mean[b]
+            P[b, a] = P[a, b]

@@ -10,8 +10,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from boresight.kernels.options import BARE, KERNEL
-from boresight.kernels.tracker import HIDDEN, VISIBLE, IntArray, Settings, Tracks
+from boresight.kernels.tracker import HIDDEN, VISIBLE, IntArray, Models, Settings, Tracks
 from boresight.kernels.tracker_copies import longer
+from boresight.kernels.tracker_models import expected_noise
 from boresight.types.sensor import FloatArray
 
 ROW_INTERVAL = 0.1  # s: at most one row a track in this time
@@ -121,7 +122,13 @@ def times_due(clock: Clock, period: FloatArray, t_recv: float) -> int:
 
 @njit(**KERNEL)
 def rows_at_arrival(
-    tr: Tracks, s: Settings, clock: Clock, period: FloatArray, coast_after: float, rows: RowTable
+    tr: Tracks,
+    s: Settings,
+    clock: Clock,
+    period: FloatArray,
+    coast_after: float,
+    rows: RowTable,
+    models: Models | None,
 ) -> None:
     """Add the rows that the newest arrival calls for: now, and ahead while no report is expected.
 
@@ -131,7 +138,7 @@ def rows_at_arrival(
     now = clock.now[ARRIVAL]
     if now - clock.now[EMITTED] < ROW_INTERVAL:
         return
-    add_rows(tr, s, now, now, coast_after, rows)
+    add_rows(tr, s, now, now, coast_after, rows, models)
     clock.now[EMITTED] = now
     until = next_expected(clock, period)
     if until < math.inf:
@@ -139,21 +146,31 @@ def rows_at_arrival(
         for _ in range(MOST_AHEAD - 1):
             if t >= until:
                 break
-            add_rows(tr, s, t, now, coast_after, rows)
+            add_rows(tr, s, t, now, coast_after, rows, models)
             clock.now[EMITTED] = t
             t += QUIET_INTERVAL
 
 
 @njit(**BARE)
-def rows_before(tr: Tracks, s: Settings, clock: Clock, t_recv: float, coast_after: float, rows: RowTable) -> None:
+def rows_before(
+    tr: Tracks,
+    s: Settings,
+    clock: Clock,
+    t_recv: float,
+    coast_after: float,
+    rows: RowTable,
+    models: Models | None,
+) -> None:
     """Add the rows that are missing since the last one, the next arrival having been late."""
     while clock.now[EMITTED] > -math.inf and clock.now[EMITTED] + LONGEST_GAP < t_recv:
         clock.now[EMITTED] += QUIET_INTERVAL
-        add_rows(tr, s, clock.now[EMITTED], clock.now[EMITTED], coast_after, rows)
+        add_rows(tr, s, clock.now[EMITTED], clock.now[EMITTED], coast_after, rows, models)
 
 
 @njit(**BARE)
-def add_rows(tr: Tracks, s: Settings, t: float, t_known: float, coast_after: float, rows: RowTable) -> None:
+def add_rows(
+    tr: Tracks, s: Settings, t: float, t_known: float, coast_after: float, rows: RowTable, models: Models | None
+) -> None:
     """Predict the shown tracks to time `t` (s) and add those that are still probable then; there must be room."""
     d = s.d
     used = rows.used[0]
@@ -163,6 +180,8 @@ def add_rows(tr: Tracks, s: Settings, t: float, t_known: float, coast_after: flo
     for i in range(tr.live[0]):
         if not (tr.life[i, 2] > 0.0 and survive * (tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN]) >= s.hide_below):
             continue
+        if models is not None:
+            q3 = expected_noise(tr, i, s, models, dt) * dt**3 / 3.0
         rows.t[used] = t
         rows.t_known[used] = t_known
         rows.birth[used] = tr.birth[i]

@@ -18,6 +18,7 @@ from boresight.kernels.tracker import (
     Extras,
     IntArray,
     Look,
+    Models,
     SensorTable,
     Settings,
     Tracks,
@@ -28,8 +29,8 @@ from boresight.kernels.tracker_end import end_and_merge, show
 from boresight.kernels.tracker_gate import gate_all
 from boresight.kernels.tracker_joint import shares, take_shares
 from boresight.kernels.tracker_place import covered, places_of, within
+from boresight.kernels.tracker_predict import predict_all
 from boresight.kernels.tracker_split import begin_beside, keep_beside, unplaced
-from boresight.kernels.tracker_state import predict_all
 from boresight.kernels.tracker_weigh import evidence, follow_blob, merged, take, weigh
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
@@ -46,13 +47,15 @@ def scan_step(
     nis_of: FloatArray,
     room: Workroom,
     extras: Extras,
+    models: Models | None,
 ) -> None:
     """Take one scan: predict, gate, assign, update, weigh, begin and end tracks; `fate`, `owner`, `nis_of` are (m,).
 
     `owner` is the birth row of the track that a detection updated, began, or was nearest to (-1: none). The arrays of
-    `tr` must have room for m more tracks. Without `extras` there are no constant errors, shares, or second bearings.
+    `tr` must have room for m more tracks. Without `extras` there are no constant errors, shares, or second bearings;
+    with `models` targets manoeuvre.
     """
-    predict_all(tr, s, look.t)
+    predict_all(tr, s, look.t, models)
     m = len(look.dt)
     n_tracks = tr.live[0]
     usable = np.zeros(m, np.bool_)
@@ -95,25 +98,26 @@ def scan_step(
         blob = merged(tr, i, s, sensor, col_of_row) if k < 0 else -1
         if blob >= 0:
             if at.there[blob]:
-                follow_blob(tr, i, s, sensor, look, at.fix[blob], blob)
+                follow_blob(tr, i, s, sensor, look, at.fix[blob], blob, models)
             continue
         if extras is not None and (sensor.joint or (tr.heard[i] == 0 and not sensor.ranging)):
-            take_shares(tr, i, s, sensor, look, at, room, start, column, share, k, p_d[i], temper)
+            take_shares(tr, i, s, sensor, look, at, room, start, column, share, k, p_d[i], temper, models)
             continue
         if k >= 0:
-            take(tr, i, s, sensor, look, k, at, room, evidence(i, start, column, loglik, row_of_col, p_d[i]), temper)
+            log_visible = evidence(i, start, column, loglik, row_of_col, p_d[i])
+            take(tr, i, s, sensor, look, k, at, room, log_visible, temper, models)
         else:
             log_any = evidence(i, start, column, loglik, row_of_col, p_d[i])
             weigh(tr, i, log_any, log_any, temper)
     if extras is not None and s.blob_share > 0.0 and unplaced(tr):
-        keep_beside(tr, s, sensor, look, col_of_row, usable, room)
+        keep_beside(tr, s, sensor, look, col_of_row, usable, room, models)
     learn_clutter(tr, s, sensor, look, claims, row_of_col, usable)
     if sensor.ranging:
-        begin(tr, s, sensor, look, fate, owner, row_of_col, usable, at, room, extras)
+        begin(tr, s, sensor, look, fate, owner, row_of_col, usable, at, room, extras, models)
         show(tr, s, sensor, look, extras)
     elif extras is not None and s.blob_share > 0.0 and m > 1:
-        begin_beside(tr, s, sensor, look, fate, owner, usable, room)
-    end_and_merge(tr, s, sensor.ranging, start, extras)
+        begin_beside(tr, s, sensor, look, fate, owner, usable, room, models)
+    end_and_merge(tr, s, sensor.ranging, start, extras, models)
     tr.live[1] += 1
 
 

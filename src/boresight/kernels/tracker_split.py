@@ -17,11 +17,13 @@ from boresight.kernels.tracker import (
     VISIBLE,
     IntArray,
     Look,
+    Models,
     SensorTable,
     Settings,
     Tracks,
 )
 from boresight.kernels.tracker_begin import new_track, pooled_constants, tell
+from boresight.kernels.tracker_models import begin_models
 from boresight.kernels.tracker_place import within
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
@@ -50,6 +52,7 @@ def begin_beside(
     owner: IntArray,
     usable: NDArray[np.bool_],
     room: Workroom,
+    models: Models | None,
 ) -> None:
     """Begin a track where two bearings stand within the angular extent that a shown track's blob may have.
 
@@ -74,7 +77,7 @@ def begin_beside(
             least = max(4.0 * noise, s.merge_distance / z[0])
             free = usable[k] and fate[k] != INITIATED and fate[k] != UPDATED
             if free and least < abs(gap) <= extent + 2.0 * noise:
-                place_beside(tr, host, s, sensor, look, k, z, gap, noise)
+                place_beside(tr, host, s, sensor, look, k, z, gap, noise, models)
                 fate[k] = INITIATED
                 owner[k] = look.row[k]
                 break
@@ -126,6 +129,7 @@ def place_beside(
     z: FloatArray,
     gap: float,
     noise: float,
+    models: Models | None,
 ) -> None:
     """Add a track `gap` (rad) in azimuth from `host`, which is at `z` (range, azimuth, elevation, sensor axes)."""
     d = s.d
@@ -146,6 +150,9 @@ def place_beside(
         for b in range(d):
             tr.anchor_P[i, a, b] = deep * along[a] * along[b] + wide * across[a] * across[b]
     join(tr, i, host, s)
+    if models is not None:
+        begin_models(tr, i, models)
+        join_models(tr, i, host, s)
     w = tr.weight[i]
     w[:] = 0.0
     w[VISIBLE] = s.blob_share
@@ -161,6 +168,7 @@ def keep_beside(
     col_of_row: IntArray,
     usable: NDArray[np.bool_],
     room: Workroom,
+    models: Models | None,
 ) -> None:
     """Move the tracks that only bearings tell of along with the track beside which they stand, and end lost ones.
 
@@ -188,6 +196,8 @@ def keep_beside(
             tr.weight[i, NOTHING] = 1.0
         else:
             join(tr, i, host, s)
+            if models is not None:
+                join_models(tr, i, host, s)
 
 
 @njit(**PART)
@@ -218,13 +228,36 @@ def shift(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: i
 @njit(**LEAF)
 def join(tr: Tracks, i: int, host: int, s: Settings) -> None:
     """Put track `i` at its place beside `host`, moving as that does."""
+    join_state(tr.x[i], tr.P[i], tr.x[host], tr.P[host], tr.anchor[i], tr.anchor_P[i], s)
+
+
+@njit(**LEAF)
+def join_models(tr: Tracks, i: int, host: int, s: Settings) -> None:
+    """The same for the states of the models; track `i` manoeuvres as `host` does."""
+    for j in range(2):
+        tr.mode[i, j] = tr.mode[host, j]
+        x, P = tr.mode_x[host, j], tr.mode_P[host, j]
+        join_state(tr.mode_x[i, j], tr.mode_P[i, j], x, P, tr.anchor[i], tr.anchor_P[i], s)
+
+
+@njit(**LEAF)
+def join_state(
+    x: FloatArray,
+    P: FloatArray,
+    host_x: FloatArray,
+    host_P: FloatArray,
+    offset: FloatArray,
+    offset_P: FloatArray,
+    s: Settings,
+) -> None:
+    """Give (x, P) the place `offset` (d,) from the host's, and its velocity."""
     d = s.d
     for a in range(d):
-        tr.x[i, a] = tr.x[host, a] + tr.anchor[i, a]
-        tr.x[i, d + a] = tr.x[host, d + a]
+        x[a] = host_x[a] + offset[a]
+        x[d + a] = host_x[d + a]
         for b in range(d):
-            tr.P[i, a, b] = tr.P[host, a, b] + tr.anchor_P[i, a, b]
-            tr.P[i, d + a, d + b] = tr.P[host, d + a, d + b]
-            tr.P[i, a, d + b] = tr.P[host, a, d + b]
-            tr.P[i, d + b, a] = tr.P[host, a, d + b]
-        tr.P[i, d + a, d + a] += (VELOCITY_SHARE * s.speed_sigma) ** 2
+            P[a, b] = host_P[a, b] + offset_P[a, b]
+            P[d + a, d + b] = host_P[d + a, d + b]
+            P[a, d + b] = host_P[a, d + b]
+            P[d + b, a] = host_P[a, d + b]
+        P[d + a, d + a] += (VELOCITY_SHARE * s.speed_sigma) ** 2

@@ -1,69 +1,17 @@
-"""How a track moves between looks, and how a detection conditions it: prediction, linearisation, innovation, update."""
+"""How a detection conditions a track: linearisation, innovation, update."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
 from boresight.kernels.measurement import measure, measure_axes, wrap
-from boresight.kernels.options import LEAF, PART
+from boresight.kernels.options import LEAF
 from boresight.kernels.registration import N_PARAMETERS, TIME, sensitivity
-from boresight.kernels.tracker import HIDDEN, NOTHING, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
+from boresight.kernels.tracker import HIDDEN, NOTHING, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
-
-
-@njit(**PART)
-def predict_all(tr: Tracks, s: Settings, t: float) -> None:
-    """Predict every track to time `t`: state (exact white-acceleration CV), biases, hypotheses."""
-    dt = t - tr.time[0]
-    tr.time[0] = t
-    if dt <= 0.0 or tr.live[0] == 0:
-        return
-    n = tr.x.shape[1]
-    d = s.d
-    q3, q2, q1 = s.q * dt**3 / 3.0, s.q * dt**2 / 2.0, s.q * dt
-    n_bias = n - 2 * d
-    decay = np.empty(n_bias)
-    for k in range(n_bias):
-        decay[k] = math.exp(-dt / s.bias_tau[k])
-    p_survive = math.exp(-dt / s.survival_time)
-    rate = 1.0 / s.hide_time + 1.0 / s.show_time
-    settle = 1.0 - math.exp(-dt * rate)
-    to_hidden = settle / (s.hide_time * rate)
-    to_visible = settle / (s.show_time * rate)
-    for i in range(tr.live[0]):
-        x = tr.x[i]
-        P = tr.P[i]
-        for a in range(d):
-            x[a] += dt * x[d + a]
-        for a in range(d):  # rows: F P
-            for j in range(n):
-                P[a, j] += dt * P[d + a, j]
-        for a in range(d):  # columns: (F P) F'
-            for j in range(n):
-                P[j, a] += dt * P[j, d + a]
-        for k in range(n_bias):
-            b = 2 * d + k
-            x[b] *= decay[k]
-            for j in range(n):
-                P[b, j] *= decay[k]
-            for j in range(n):
-                P[j, b] *= decay[k]
-            P[b, b] += s.bias_sigma[k] ** 2 * (1.0 - decay[k] ** 2)
-        for a in range(d):
-            P[a, a] += q3
-            P[d + a, d + a] += q1
-            P[a, d + a] += q2
-            P[d + a, a] += q2
-            tr.anchor_P[i, a, a] += s.static_q * dt
-        w = tr.weight[i]
-        v, h = w[VISIBLE] * p_survive, w[HIDDEN] * p_survive
-        w[NOTHING] += (1.0 - p_survive) * (w[VISIBLE] + w[HIDDEN])
-        w[VISIBLE] = v * (1.0 - to_hidden) + h * to_visible
-        w[HIDDEN] = h * (1.0 - to_visible) + v * to_hidden
 
 
 @njit(**LEAF)
@@ -210,14 +158,30 @@ def learners(tr: Tracks, i: int, s: Settings, sensor: SensorTable) -> int:
 
 
 @njit(**LEAF)
-def condition(
-    x: FloatArray, P: FloatArray, d: int, k: int, look: Look, sensor: SensorTable, room: Workroom, considered: int
-) -> None:
-    """Condition (x, P) at the time of a look on its detection `k`; the first `considered` states learn."""
+def look_along(
+    x: FloatArray, P: FloatArray, d: int, k: int, look: Look, sensor: SensorTable, room: Workroom
+) -> tuple[int, float]:
+    """Hold (x, P) at the time of a look against its detection `k`: fills `room` for `apply_update`.
+
+    Returns how many components it has, and their log-likelihood but for a constant.
+    """
     m = components(look.z[k], d, room.mask)
     linearise(x, d, k, look.dt[k], look, sensor, m, room)
-    innovation(P, look.z[k], look.R[k], m, room, d, sensor.constant[TIME])
+    nis, logdet = innovation(P, look.z[k], look.R[k], m, room, d, sensor.constant[TIME])
+    return m, -0.5 * (nis + logdet)
+
+
+@njit(**LEAF)
+def condition(
+    x: FloatArray, P: FloatArray, d: int, k: int, look: Look, sensor: SensorTable, room: Workroom, considered: int
+) -> float:
+    """Condition (x, P) at the time of a look on its detection `k`; the first `considered` states learn.
+
+    Returns the log-likelihood but for a constant.
+    """
+    m, log_likelihood = look_along(x, P, d, k, look, sensor, room)
     apply_update(x, P, m, room, considered)
+    return float(log_likelihood)
 
 
 @njit(**LEAF)

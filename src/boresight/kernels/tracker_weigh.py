@@ -7,8 +7,9 @@ import math
 import numpy as np
 from numba import njit
 
-from boresight.kernels.options import LEAF
-from boresight.kernels.tracker import HIDDEN, STATIC, VISIBLE, IntArray, Look, SensorTable, Settings, Tracks
+from boresight.kernels.options import LEAF, PART
+from boresight.kernels.tracker import HIDDEN, STATIC, VISIBLE, IntArray, Look, Models, SensorTable, Settings, Tracks
+from boresight.kernels.tracker_models import combine_models, condition_models
 from boresight.kernels.tracker_place import Places, fix_sensitivity
 from boresight.kernels.tracker_state import condition, factor, learners, whiten
 from boresight.kernels.tracker_workroom import Workroom
@@ -48,36 +49,60 @@ def merged(tr: Tracks, i: int, s: Settings, sensor: SensorTable, col_of_row: Int
 
 
 @njit(cache=True)
-def follow_blob(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, fix: FloatArray, k: int) -> None:
+def follow_blob(
+    tr: Tracks,
+    i: int,
+    s: Settings,
+    sensor: SensorTable,
+    look: Look,
+    fix: FloatArray,
+    k: int,
+    models: Models | None,
+) -> None:
     """Keep a track that was not detected alone near the detection `k` at `fix` (3,) that may hold it too.
 
-    Along the line of sight and across it, a variance that has grown beyond that of the blob (half its size) comes down
-    to it and never lower: the second look at a blob says nothing that the first did not. Where only bearings placed
-    the track, across is theirs.
+    Where only bearings placed the track, across the line of sight is theirs.
     """
-    d = s.d
-    n = tr.x.shape[1]
+    axes = 1 if tr.heard[i] == 0 else 2
+    if models is None:
+        draw_in(tr.x[i], tr.P[i], s.d, axes, sensor, look, fix, k)
+    else:
+        for j in range(2):
+            draw_in(tr.mode_x[i, j], tr.mode_P[i, j], s.d, axes, sensor, look, fix, k)
+        combine_models(tr, i)
+
+
+@njit(**PART)
+def draw_in(
+    x: FloatArray, P: FloatArray, d: int, axes: int, sensor: SensorTable, look: Look, fix: FloatArray, k: int
+) -> None:
+    """Draw (x, P) to a blob at `fix` (3,): along the line of sight, and with two `axes` across it.
+
+    A variance that has grown beyond that of the blob (half its size) comes down to it and never lower: the second look
+    at a blob says nothing that the first did not.
+    """
+    n = len(x)
     east, north = fix[0] - look.sensor_position[k, 0], fix[1] - look.sensor_position[k, 1]
     far = max(math.hypot(east, north), 1e-9)
     axis = np.zeros(d)
-    for turn in range(1 if tr.heard[i] == 0 else 2):
+    for turn in range(axes):
         axis[0], axis[1] = (east / far, north / far) if turn == 0 else (north / far, -east / far)
         Pa = np.zeros(n)
         for a in range(n):
             for b in range(d):
-                Pa[a] += tr.P[i, a, b] * axis[b]
+                Pa[a] += P[a, b] * axis[b]
         variance = 0.0
         off = 0.0
         for a in range(d):
             variance += axis[a] * Pa[a]
-            off += axis[a] * (fix[a] - tr.x[i, a])
+            off += axis[a] * (fix[a] - x[a])
         wanted = (0.5 * sensor.resolution) ** 2
         if variance > wanted:
             gain = (1.0 - wanted / variance) / variance
             for a in range(n):
-                tr.x[i, a] += gain * Pa[a] * off
+                x[a] += gain * Pa[a] * off
                 for b in range(n):
-                    tr.P[i, a, b] -= gain * Pa[a] * Pa[b]
+                    P[a, b] -= gain * Pa[a] * Pa[b]
 
 
 @njit(**LEAF)
@@ -199,6 +224,7 @@ def take(
     room: Workroom,
     log_visible: float,
     temper: float,
+    models: Models | None,
 ) -> None:
     """Condition track `i` on detection `k`: state, anchor and hypotheses."""
     log_static = log_visible
@@ -206,7 +232,11 @@ def take(
         moving = moving_likelihood(tr, i, s, sensor, look, k, at, room)
         log_static += static_likelihood(tr, i, s, room.fix, at.covariance[k], room) - moving
     if sensor.moves_tracks:
-        condition(tr.x[i], tr.P[i], s.d, k, look, sensor, room, learners(tr, i, s, sensor))
+        considered = learners(tr, i, s, sensor)
+        if models is None:
+            condition(tr.x[i], tr.P[i], s.d, k, look, sensor, room, considered)
+        else:
+            condition_models(tr, i, s, k, look, sensor, room, considered)
     weigh(tr, i, log_visible, log_static, temper)
     note_hit(tr, i, s, sensor, look.t + look.dt[k], sensor.moves_tracks)
 

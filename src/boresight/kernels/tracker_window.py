@@ -13,7 +13,7 @@ from typing import NamedTuple
 from numba import njit
 
 from boresight.kernels.options import BARE, KERNEL
-from boresight.kernels.tracker import Extras, IntArray, SensorTable, Settings, Tracks
+from boresight.kernels.tracker import Extras, IntArray, Models, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_copies import Copies, keep, restore
 from boresight.kernels.tracker_looks import NO_SENSOR, Looks, look_at, sensor_at
 from boresight.kernels.tracker_rows import (
@@ -69,6 +69,7 @@ def advance(
     rows: RowTable,
     room: Workroom,
     extras: Extras,
+    models: Models | None,
 ) -> int:
     """Take looks in order of arrival, in place; returns the place of the first for which there was no room.
 
@@ -81,7 +82,7 @@ def advance(
         clock, period, coast_after: when rows are due (`tracker_rows`).
         rows: gets the rows due on the way.
         room: written over.
-        extras: as `tracker_scan.scan_step` takes it.
+        extras, models: as `tracker_scan.scan_step` takes them.
     """
     order = queue.order
     for k in range(begin, len(looks.t)):
@@ -95,8 +96,8 @@ def advance(
         if not _has_room(tr, copies, looks, queue, k, at, times_due(clock, period, t_recv) if due else 0, rows):
             return k
         if due:
-            rows_at_arrival(tr, s, clock, period, coast_after, rows)
-            rows_before(tr, s, clock, t_recv, coast_after, rows)
+            rows_at_arrival(tr, s, clock, period, coast_after, rows, models)
+            rows_before(tr, s, clock, t_recv, coast_after, rows, models)
         if looks.sensor[k] == NO_SENSOR:
             if t_recv > clock.now[ARRIVAL] > -math.inf:
                 clock.now[ARRIVAL], clock.now[PENDING] = t_recv, 1.0
@@ -113,20 +114,22 @@ def advance(
         order[at] = k
         queue.length[0] = n + 1
         if at < n:
-            at = go_back(tr, copies, empty, looks, order, at)
+            at = go_back(tr, copies, empty, looks, order, at, models)
         for j in range(at, n + 1):
             next_, c = order[j], copies.used[0]
             if length > 0.0 and (c == 0 or looks.t[next_] - copies.t[c - 1] >= COPY_INTERVAL):
-                keep(copies, tr, looks.t[next_], looks.number[next_])
+                keep(copies, tr, looks.t[next_], looks.number[next_], models)
             a, b = looks.first[next_], looks.first[next_ + 1]
             sensor = sensor_at(sensors, looks.sensor[next_])
             fate = fates.code[a:b], fates.owner[a:b], fates.nis[a:b]
-            scan_step(tr, s, sensor, look_at(looks, next_), *fate, room, extras)
+            scan_step(tr, s, sensor, look_at(looks, next_), *fate, room, extras, models)
     return len(looks.t)
 
 
 @njit(**BARE)
-def go_back(tr: Tracks, copies: Copies, empty: Copies, looks: Looks, order: IntArray, at: int) -> int:
+def go_back(
+    tr: Tracks, copies: Copies, empty: Copies, looks: Looks, order: IntArray, at: int, models: Models | None
+) -> int:
     """Take up the newest copy before the look at place `at` of `order`; returns the place to go on from."""
     t = looks.t[order[at]]
     c = copies.used[0]
@@ -134,9 +137,9 @@ def go_back(tr: Tracks, copies: Copies, empty: Copies, looks: Looks, order: IntA
         c -= 1
     copies.used[0] = c
     if c == 0:  # older than everything so far, and nothing has left the window yet
-        restore(empty, 0, tr)
+        restore(empty, 0, tr, models)
         return 0
-    restore(copies, c - 1, tr)
+    restore(copies, c - 1, tr, models)
     while looks.number[order[at]] != copies.number[c - 1]:
         at -= 1
     return at

@@ -11,6 +11,7 @@ from boresight.errors import UserError, did_you_mean
 ASSOCIATIONS = ("nearest", "jpda")
 # what values may be; None is left out
 POSITIVE = ("survival_time", "hide_time", "show_time", "speed_sigma")
+TIMES = ("manoeuvre_every", "manoeuvre_lasts")
 SHARES = ("static_share", "stop_floor", "doubt", "delete_below", "blob_share")
 NOT_NEGATIVE = (
     "q", "birth_rate", "static_q", "targets_at_start", "apart", "merge_distance", "coast_after", "smoothing_lag",
@@ -57,6 +58,9 @@ class TrackerConfig:
     """
 
     q: float | None = None  # m²/s³, white-acceleration power spectral density (2-D: 0.1, 3-D: 1)
+    q_manoeuvre: float | None = None  # m²/s³, the same during a manoeuvre: targets move by two models (None: by one)
+    manoeuvre_every: float | None = None  # s, mean time from the end of a manoeuvre to the next (60)
+    manoeuvre_lasts: float | None = None  # s, mean time that one lasts (10)
     speed_sigma: float | None = None  # m/s, prior velocity of a new track per axis (2-D: 8, 3-D: 150)
     gate_probability: float = 0.999
     association: str = "nearest"  # or "jpda": tracks share the detections in their gates instead of taking one each
@@ -89,10 +93,15 @@ class TrackerConfig:
         _check(self, "tracker", SHARES, lambda v: 0.0 <= v <= 1.0, "must lie in [0, 1]")
         _check(self, "tracker", NOT_NEGATIVE, lambda v: v >= 0.0, "must not be negative")
         _check(self, "tracker", ("clutter_memory",), lambda v: v >= 1.0, "must be 1 or more")
+        _check(self, "tracker", TIMES, lambda v: 0.0 < v < math.inf, "must be positive and finite")
         if not 0.5 <= self.gate_probability < 1.0:
             raise UserError("tracker: gate_probability must lie in [0.5, 1)")
         if not 0.0 <= self.hide_below <= self.confirm_above <= 1.0:
             raise UserError("tracker: need 0 <= hide_below <= confirm_above <= 1")
+        if self.q_manoeuvre is None:
+            for name in ("manoeuvre_every", "manoeuvre_lasts"):
+                if getattr(self, name) is not None:
+                    raise UserError(f"tracker: {name} says nothing without q_manoeuvre; give that too")
         _check_association(self.association, "tracker")
         for sensor, errors in self.sensors.items():
             where = f"sensor['{sensor}']"

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import chi2
 
+from boresight.errors import UserError
 from boresight.kernels.registration import AZIMUTH, ELEVATION, N_PARAMETERS, RANGE, SCALE, TIME
-from boresight.kernels.tracker import AZIMUTH_BINS, Extras, IntArray, SensorTable, Settings, Tracks
-from boresight.kernels.tracker_copies import EACH, WHOLE, Copies, no_copies
+from boresight.kernels.tracker import AZIMUTH_BINS, Extras, IntArray, Models, SensorTable, Settings, Tracks
+from boresight.kernels.tracker_copies import WHOLE, Copies, each_of, no_copies
 from boresight.kernels.tracker_looks import columns_of
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.types import N_COMPONENTS, Component, FloatArray, Sensor, SensorKind
@@ -35,6 +36,7 @@ class Plan(NamedTuple):
     columns: SensorTable  # all sensors in one table, with a leading axis
     empty: Copies  # one: the tracks before the first look
     extras: Extras  # None where the kernel can do without what takes long to compile
+    models: Models | None  # None where targets move by one model
 
 
 def make_plan(
@@ -68,7 +70,9 @@ def make_plan(
     settings = _settings(config, d, np.array(sigma), np.array(tau), len(known), ranging)
     n = 2 * d + len(sigma)
     extras = bool(known or config.blob_share > 0.0 or any(t.joint for t in tables)) or None
-    return Plan(settings, tuple(tables), n, columns_of(tuple(tables)), _before_all(settings, tables, n), extras)
+    models = _models(config, settings.q)
+    empty = _before_all(settings, tables, n, models is not None)
+    return Plan(settings, tuple(tables), n, columns_of(tuple(tables)), empty, extras, models)
 
 
 def _table(
@@ -142,6 +146,17 @@ def _settings(
     )
 
 
+def _models(config: TrackerConfig, q: float) -> Models | None:
+    """Pack the model of manoeuvres, if there is one; `q` is the process noise between them."""
+    if config.q_manoeuvre is None:
+        return None
+    if not q < config.q_manoeuvre < math.inf:
+        told = f"finite and larger than {q:g}, the process noise between manoeuvres"
+        raise UserError(f"tracker: q_manoeuvre must be {told}, not {config.q_manoeuvre:g}")
+    every, lasts = config.manoeuvre_every or 60.0, config.manoeuvre_lasts or 10.0
+    return Models(q=config.q_manoeuvre, every=every, lasts=lasts)
+
+
 def _biases(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[Component, float]]:
     """Return (component, sigma) of the wandering biases that are declared and of which the sensor measures anything."""
     return [
@@ -171,8 +186,8 @@ def _constants(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[i
     ]
 
 
-def _before_all(settings: Settings, sensors: Sequence[SensorTable], n: int) -> Copies:
-    """Return one copy of a table without tracks of `n` states."""
+def _before_all(settings: Settings, sensors: Sequence[SensorTable], n: int, models: bool) -> Copies:
+    """Return one copy of a table without tracks of `n` states, which two models have too if wanted."""
     k = settings.n_constant
     clutter = np.zeros((len(sensors), AZIMUTH_BINS + 1))
     for table in sensors:
@@ -197,6 +212,8 @@ def _before_all(settings: Settings, sensors: Sequence[SensorTable], n: int) -> C
         undetected=np.full(1, settings.targets_at_start),
         seen_range=np.zeros(len(sensors)),
     )
+    if models:
+        tracks = tracks._replace(mode=np.zeros((0, 2)), mode_x=np.zeros((0, 2, n)), mode_P=np.zeros((0, 2, n, n)))
     one = no_copies(tracks)
     whole = {name: getattr(tracks, name)[None] for name in WHOLE}
     return one._replace(
@@ -208,12 +225,9 @@ def copy_tracks(tr: Tracks, capacity: int | None = None) -> Tracks:
     """Copy the live rows (and the room for `capacity`, by default as much as there was)."""
     n = int(tr.live[0])
     size = len(tr.birth) if capacity is None else capacity
-    parts = {}
-    for name, array in tr._asdict().items():
-        if name in EACH:
-            fresh = np.zeros((size, *array.shape[1:]), array.dtype)
-            fresh[:n] = array[:n]
-            parts[name] = fresh
-        else:
-            parts[name] = array.copy()
+    parts = {name: getattr(tr, name).copy() for name in WHOLE}
+    for name in each_of(tr):
+        array = getattr(tr, name)
+        parts[name] = np.zeros((size, *array.shape[1:]), array.dtype)
+        parts[name][:n] = array[:n]
     return Tracks(**parts)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from boresight.errors import UserError
 from boresight.kernels.tracker import Tracks
-from boresight.kernels.tracker_copies import EACH, WHOLE, Copies
+from boresight.kernels.tracker_copies import EACH, WHOLE, Copies, each_of
 from boresight.kernels.tracker_looks import Looks
 from boresight.kernels.tracker_rows import Clock
 from boresight.kernels.tracker_window import Fates
@@ -21,7 +21,7 @@ from boresight.tracking.tracker import Tracker, TrackerState
 from boresight.tracking.window import Window, held
 
 Arrays = dict[str, NDArray[np.generic]]
-FORMAT = 3
+FORMAT = 4
 
 
 def snapshot(state: TrackerState) -> TrackerState:
@@ -30,7 +30,7 @@ def snapshot(state: TrackerState) -> TrackerState:
     window = replace(
         w,
         tracks=copy_tracks(w.tracks),
-        copies=Copies._make(a.copy() for a in w.copies),
+        copies=w.copies._replace(**{name: a.copy() for name, a in _there(w.copies).items()}),
         clock=Clock._make(a.copy() for a in w.clock),
     )
     return TrackerState(window, state.names.copy(), state.smoothed)
@@ -49,9 +49,9 @@ def arrays_of_state(state: TrackerState) -> Arrays:
     }
     n, c = int(w.tracks.live[0]), int(w.copies.used[0])
     room = {"t": c, "number": c, "first": c + 1} | dict.fromkeys(WHOLE, c) | dict.fromkeys(EACH, int(w.copies.first[c]))
-    for name, array in w.tracks._asdict().items():
+    for name, array in _there(w.tracks).items():
         out[f"tracks.{name}"] = array[:n] if name in EACH else array
-    for name, array in w.copies._asdict().items():
+    for name, array in _there(w.copies).items():
         out[f"copies.{name}"] = array[: room[name]] if name in room else array
     for prefix, parts in (("looks", w.looks), ("fates", w.fates), ("clock", w.clock)):
         for name, array in parts._asdict().items():
@@ -66,7 +66,9 @@ def state_of_arrays(arrays: Mapping[str, NDArray[np.generic]], tracker: Tracker)
     """
     if "format" not in arrays or int(arrays["format"][0]) != FORMAT:
         raise UserError(f"saved tracker state: not of format {FORMAT}; save it again with this version")
-    if arrays["tracks.x"].shape[1] != tracker.plan.n_states or len(arrays["tracks.last_look"]) != len(tracker.sensors):
+    shape = {f"tracks.{name}": getattr(tracker.plan.empty, name).shape[1:] for name in each_of(tracker.plan.empty)}
+    saved = {f"tracks.{name}": arrays[f"tracks.{name}"].shape[1:] for name in EACH if f"tracks.{name}" in arrays}
+    if saved != shape or len(arrays["tracks.last_look"]) != len(tracker.sensors):
         raise UserError("saved tracker state: made with other sensors or settings; use the same recording and --config")
     tracks = Tracks(**_parts(arrays, "tracks"))
     window = Window(
@@ -81,6 +83,11 @@ def state_of_arrays(arrays: Mapping[str, NDArray[np.generic]], tracker: Tracker)
     )
     names = Names(int(np.asarray(arrays["counts"])[1]), **_parts(arrays, "names"))
     return TrackerState(window, names, float(np.asarray(arrays["smoothed"], np.float64)[0]))
+
+
+def _there(item: Tracks | Copies) -> dict[str, Any]:
+    """Return the arrays that there are, by name."""
+    return {name: array for name, array in item._asdict().items() if array is not None}
 
 
 def _parts(arrays: Mapping[str, NDArray[np.generic]], prefix: str) -> dict[str, Any]:

@@ -138,8 +138,9 @@ class Tracker:
             times = times_due(window.clock, self._period, np.inf)
             rows = row_table(times * int(window.tracks.live[0]), self.dimensions)
             rows_at_arrival(
-                window.tracks, self.plan.settings, window.clock, self._period, self.config.coast_after, rows
-            )
+                window.tracks, self.plan.settings, window.clock, self._period, self.config.coast_after, rows,
+                self.plan.models,
+            )  # fmt: skip
             self._write(state, rows, out)
         if self.config.smoothing_lag is not None:
             self._smooth(state, out, np.inf)

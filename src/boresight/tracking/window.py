@@ -86,7 +86,7 @@ def take(
     while True:
         done = advance(
             window.tracks, window.copies, plan.empty, plan.settings, plan.columns, every, fates, queue, done, length,
-            window.clock, period, coast_after, rows, room, plan.extras,
+            window.clock, period, coast_after, rows, room, plan.extras, plan.models,
         )  # fmt: skip
         if done == total:
             break

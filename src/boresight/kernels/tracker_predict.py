@@ -1,0 +1,74 @@
+"""How a track moves between looks: state, biases, hypotheses."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from boresight.kernels.options import LEAF, PART
+from boresight.kernels.tracker import HIDDEN, NOTHING, VISIBLE, Models, Settings, Tracks
+from boresight.kernels.tracker_models import mix_models
+from boresight.types.sensor import FloatArray
+
+
+@njit(**PART)
+def predict_all(tr: Tracks, s: Settings, t: float, models: Models | None) -> None:
+    """Predict every track to time `t`: state (exact white-acceleration CV), biases, hypotheses."""
+    dt = t - tr.time[0]
+    tr.time[0] = t
+    if dt <= 0.0 or tr.live[0] == 0:
+        return
+    n_bias = tr.x.shape[1] - 2 * s.d
+    decay = np.empty(n_bias)
+    for k in range(n_bias):
+        decay[k] = math.exp(-dt / s.bias_tau[k])
+    p_survive = math.exp(-dt / s.survival_time)
+    rate = 1.0 / s.hide_time + 1.0 / s.show_time
+    settle = 1.0 - math.exp(-dt * rate)
+    to_hidden = settle / (s.hide_time * rate)
+    to_visible = settle / (s.show_time * rate)
+    for i in range(tr.live[0]):
+        q = s.q
+        if models is not None:
+            q = mix_models(tr, i, s, models, dt)
+            predict(tr.mode_x[i, 0], tr.mode_P[i, 0], s, dt, s.q, decay)
+            predict(tr.mode_x[i, 1], tr.mode_P[i, 1], s, dt, models.q, decay)
+        predict(tr.x[i], tr.P[i], s, dt, q, decay)
+        for a in range(s.d):
+            tr.anchor_P[i, a, a] += s.static_q * dt
+        w = tr.weight[i]
+        v, h = w[VISIBLE] * p_survive, w[HIDDEN] * p_survive
+        w[NOTHING] += (1.0 - p_survive) * (w[VISIBLE] + w[HIDDEN])
+        w[VISIBLE] = v * (1.0 - to_hidden) + h * to_visible
+        w[HIDDEN] = h * (1.0 - to_visible) + v * to_hidden
+
+
+@njit(**LEAF)
+def predict(x: FloatArray, P: FloatArray, s: Settings, dt: float, q: float, decay: FloatArray) -> None:
+    """Predict (x, P) over `dt` (s) with process noise `q` (m²/s³); `decay` of the biases, 1 for the constant ones."""
+    n = len(x)
+    d = s.d
+    q3, q2, q1 = q * dt**3 / 3.0, q * dt**2 / 2.0, q * dt
+    for a in range(d):
+        x[a] += dt * x[d + a]
+    for a in range(d):  # rows: F P
+        for j in range(n):
+            P[a, j] += dt * P[d + a, j]
+    for a in range(d):  # columns: (F P) F'
+        for j in range(n):
+            P[j, a] += dt * P[j, d + a]
+    for k in range(len(decay)):
+        b = 2 * d + k
+        x[b] *= decay[k]
+        for j in range(n):
+            P[b, j] *= decay[k]
+        for j in range(n):
+            P[j, b] *= decay[k]
+        P[b, b] += s.bias_sigma[k] ** 2 * (1.0 - decay[k] ** 2)
+    for a in range(d):
+        P[a, a] += q3
+        P[d + a, d + a] += q1
+        P[a, d + a] += q2
+        P[d + a, a] += q2

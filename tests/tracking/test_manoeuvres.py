@@ -1,0 +1,88 @@
+"""Two models of motion in the tracker: the textbook's on one target, honest in turns, carried wherever tracks are."""
+
+from __future__ import annotations
+
+import numpy as np
+from filterpy.kalman import IMMEstimator, KalmanFilter
+from scipy.linalg import expm
+
+from boresight.filters.imm import InteractingModels
+from boresight.models import NearlyConstantVelocity, Radar
+from boresight.tracking.config import TrackerConfig
+from boresight.tracking.tracker import Tracker
+from boresight.types import Scan, Sensor, SensorKind
+
+NAN = float("nan")
+QUIET, MANOEUVRE, EVERY, LASTS = 0.01, 4.0, 30.0, 8.0
+CONFIG = TrackerConfig(
+    q=QUIET, q_manoeuvre=MANOEUVRE, manoeuvre_every=EVERY, manoeuvre_lasts=LASTS, gate_probability=0.999999, window=0.0
+)
+
+
+def weaving(t: float) -> np.ndarray:
+    """Place (m) of a target that goes straight on for 20 s, then turns at 1.5 m/s² for 10 s."""
+    s = max(t - 20.0, 0.0)
+    return np.array([150.0 + 6.0 * t - 0.75 * min(s, 10.0) ** 2 - 15.0 * max(s - 10.0, 0.0), 80.0 + 2.0 * t])
+
+
+def test_one_target_is_filterpys_imm() -> None:
+    """Linear, at equal intervals, as FilterPy has it; every look updates the one track."""
+    sigma = np.full(7, NAN)
+    sigma[4:6] = 3.0
+    tracker = Tracker(CONFIG, (Sensor("lidar", SensorKind.LIDAR, sigma=sigma),), 2)
+    rng = np.random.default_rng(2)
+    state, dt = tracker.init(), 0.8
+    G = np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
+    imm = None
+    most = 0.0
+    for k in range(50):
+        z, R = np.full((1, 7), NAN), np.full((1, 7, 7), NAN)
+        z[0, 4:6] = weaving(dt * k) + 3.0 * rng.standard_normal(2)
+        R[0, 4:6, 4:6] = 9.0 * np.eye(2)
+        state, _ = tracker.step(state, Scan(0, dt * k, dt * k, np.array([dt * k]), z, R, np.array([k])))
+        tr = state.window.tracks
+        assert tr.live[0] == 1
+        if imm is None:
+            filters = []
+            for q in (QUIET, MANOEUVRE):
+                f = KalmanFilter(4, 2)
+                f.x, f.P, f.R, f.H = tr.x[0].copy(), tr.P[0].copy(), 9.0 * np.eye(2), np.eye(2, 4)
+                f.F, f.Q = np.kron([[1.0, dt], [0.0, 1.0]], np.eye(2)), q * np.kron(G, np.eye(2))
+                filters.append(f)
+            M = expm(dt * np.array([[-1.0 / EVERY, 1.0 / EVERY], [1.0 / LASTS, -1.0 / LASTS]]))
+            imm = IMMEstimator(filters, np.array([EVERY, LASTS]) / (EVERY + LASTS), M)
+            continue
+        imm.predict()
+        imm.update(z[0, 4:6])
+        np.testing.assert_allclose(tr.mode[0], imm.mu, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(tr.x[0], imm.x, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(tr.P[0], imm.P, rtol=1e-9, atol=1e-9)
+        most = max(most, tr.mode[0, 1])
+    assert most > 0.9  # it saw the turn
+
+
+def test_one_target_is_the_librarys_imm() -> None:
+    """Range and azimuth at irregular times, against the single-target filter."""
+    sigma = np.full(7, NAN)
+    sigma[:2] = 3.0, 0.01
+    tracker = Tracker(CONFIG, (Sensor("radar", SensorKind.RADAR, sigma=sigma),), 2)
+    imm = InteractingModels((NearlyConstantVelocity(QUIET, 2), NearlyConstantVelocity(MANOEUVRE, 2)), (EVERY, LASTS))
+    radar = Radar(3.0, 0.01, dimensions=2)
+    rng = np.random.default_rng(3)
+    state, alone, t = tracker.init(), None, 0.0
+    for k in range(60):
+        place = weaving(t)
+        z, R = np.full((1, 7), NAN), np.full((1, 7, 7), NAN)
+        z[0, :2] = np.hypot(*place) + 3.0 * rng.standard_normal(), np.arctan2(*place) + 0.01 * rng.standard_normal()
+        R[0, :2, :2] = np.diag([9.0, 1e-4])
+        state, _ = tracker.step(state, Scan(0, t, t, np.array([t]), z, R, np.array([k])))
+        tr = state.window.tracks
+        assert tr.live[0] == 1
+        if alone is None:
+            alone = imm.init(t, tr.x[0].copy(), tr.P[0].copy(), (0.0, 0.0), np.array([EVERY, LASTS]) / (EVERY + LASTS))
+        else:
+            alone, _ = imm.update(imm.predict(alone, t), radar, z[0, :2])
+        np.testing.assert_allclose(tr.mode[0], alone.weights, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(tr.x[0], alone.x, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(tr.P[0], alone.P, rtol=1e-9, atol=1e-9)
+        t += rng.uniform(0.3, 1.5)
