@@ -8,6 +8,7 @@ import pytest
 
 from boresight.errors import UserError
 from boresight.tracking.config import SensorErrors, TrackerConfig
+from boresight.tracking.core import make_plan
 
 
 @pytest.mark.parametrize(
@@ -22,6 +23,9 @@ from boresight.tracking.config import SensorErrors, TrackerConfig
         {"speed_sigma": 0.0},
         {"q": -1.0},
         {"clutter_memory": 0.5},
+        {"manoeuvre_lasts": 5.0},
+        {"manoeuvre_every": 0.0, "q_manoeuvre": 1.0},
+        {"manoeuvre_lasts": float("inf"), "q_manoeuvre": 1.0},
     ],
 )
 def test_a_value_out_of_range_is_named(values: dict[str, Any]) -> None:
@@ -42,3 +46,9 @@ def test_an_unknown_association_is_named() -> None:
         TrackerConfig(association="neares")
     with pytest.raises(UserError, match=r"sensor\['radar'\]"):
         TrackerConfig(sensors={"radar": SensorErrors(association="gnn")})
+
+
+def test_a_manoeuvre_is_rougher_than_quiet_motion() -> None:
+    for q, q_manoeuvre in ((0.5, 0.5), (None, 0.05), (0.1, float("inf"))):
+        with pytest.raises(UserError, match="q_manoeuvre must be finite and larger"):
+            make_plan(TrackerConfig(q=q, q_manoeuvre=q_manoeuvre), (), 2)

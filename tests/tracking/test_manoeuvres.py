@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
+import pytest
 from filterpy.kalman import IMMEstimator, KalmanFilter
 from scipy.linalg import expm
 
+from boresight.errors import UserError
 from boresight.filters.imm import InteractingModels
+from boresight.io.scans import iter_scans
+from boresight.kernels.tracker import Tracks
 from boresight.models import NearlyConstantVelocity, Radar
-from boresight.tracking.config import TrackerConfig
+from boresight.tracking.config import SensorErrors, TrackerConfig
+from boresight.tracking.run import run, track_rows, tracker_for
+from boresight.tracking.saved import arrays_of_state, state_of_arrays
 from boresight.tracking.tracker import Tracker
-from boresight.types import Scan, Sensor, SensorKind
+from boresight.types import Recording, Scan, Sensor, SensorKind
 
 NAN = float("nan")
 QUIET, MANOEUVRE, EVERY, LASTS = 0.01, 4.0, 30.0, 8.0
@@ -86,3 +94,55 @@ def test_one_target_is_the_librarys_imm() -> None:
         np.testing.assert_allclose(tr.x[0], alone.x, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(tr.P[0], alone.P, rtol=1e-9, atol=1e-9)
         t += rng.uniform(0.3, 1.5)
+
+
+TWO = TrackerConfig(q=0.02, q_manoeuvre=2.0, manoeuvre_every=20.0)
+
+
+def whole_and_sure(tr: Tracks) -> None:
+    """x and P are the moments of the models, whose probabilities add to one."""
+    n = int(tr.live[0])
+    w, X, P = tr.mode[:n], tr.mode_x[:n], tr.mode_P[:n]
+    np.testing.assert_allclose(w.sum(axis=1), 1.0, rtol=1e-12)
+    x = np.einsum("nj,njs->ns", w, X)
+    gap = X - x[:, None]
+    moments = np.einsum("nj,njab->nab", w, P + gap[..., :, None] * gap[..., None, :])
+    np.testing.assert_allclose(tr.x[:n], x, rtol=1e-9, atol=1e-8)
+    np.testing.assert_allclose(tr.P[:n], moments, rtol=1e-8, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        TWO,
+        dataclasses.replace(TWO, association="jpda"),
+        dataclasses.replace(
+            TWO, sensors={"radar": SensorErrors(offset_time=0.5, offset_azimuth=0.02, offset_range=5.0)}
+        ),
+        dataclasses.replace(TWO, blob_share=0.1, sensors={"radar": SensorErrors(resolution=25.0)}),
+    ],
+    ids=["nearest", "jpda", "constants", "blobs"],
+)
+def test_late_looks_and_saved_states_keep_the_models(config: TrackerConfig, harbour: Recording) -> None:
+    """In all ways to move a track: moments of the models always, and the same however the looks come."""
+    tracker, scans = tracker_for(harbour, config), list(iter_scans(harbour))
+    state, _, _ = run(tracker, scans[:150], finish=False)
+    whole_and_sure(state.window.tracks)
+    saved = state_of_arrays(arrays_of_state(state), tracker)
+    state, rows, _ = run(tracker, scans[150:], state)
+    _, same, _ = run(tracker, scans[150:], saved)
+    whole_and_sure(state.window.tracks)
+    np.testing.assert_array_equal(track_rows(rows).position, track_rows(same).position)
+    valid = [s.t_look - harbour.sensors[s.sensor].latency for s in scans]
+    in_order = [
+        dataclasses.replace(scans[i], t_recv=valid[i] + 1.3) for i in np.argsort(valid, kind="stable")
+    ]  # the radar comes a second late above, and in its place here
+    other, _, _ = run(tracker, in_order)
+    a, b = state.window.tracks, other.window.tracks
+    n = int(a.live[0])
+    assert n == int(b.live[0]) > 1
+    for name in ("birth", "mode", "mode_x", "mode_P", "x", "P"):
+        np.testing.assert_allclose(getattr(a, name)[:n], getattr(b, name)[:n], rtol=1e-6, atol=1e-6, err_msg=name)
+    plain = tracker_for(harbour, dataclasses.replace(config, q_manoeuvre=None, manoeuvre_every=None))
+    with pytest.raises(UserError, match="other sensors or settings"):
+        state_of_arrays(arrays_of_state(state), plain)

@@ -167,8 +167,8 @@ def look_along(
     """
     m = components(look.z[k], d, room.mask)
     linearise(x, d, k, look.dt[k], look, sensor, m, room)
-    nis, logdet = innovation(P, look.z[k], look.R[k], m, room, d, sensor.constant[TIME])
-    return m, -0.5 * (nis + logdet)
+    nis = innovation(P, look.z[k], look.R[k], m, room, d, sensor.constant[TIME])
+    return m, -0.5 * (nis + log_determinant(m, room))
 
 
 @njit(**LEAF)
