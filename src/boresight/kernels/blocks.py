@@ -160,12 +160,11 @@ def _gain(p: Three, v: Three, A: Six, B: Nine, C: Six, a: Three, b: Three, s: fl
     """Return the belief with the gain (a, b)/s applied: x⁺ = x + (a, b) y/s, P⁺ = P - (a, b)(a, b)ᵀ/s."""
     seen = y == y
     good = s > 0.0
-    w = 1.0 / s if seen else 0.0
-    w = w if good else 0.0
-    e = w * y if seen else 0.0
+    w = 1.0 / s if seen & good else 0.0
+    y = y if seen else 0.0
+    e = w * y
     k = (w * a[0], w * a[1], w * a[2])
     m = (w * b[0], w * b[1], w * b[2])
-    nis = e * y if seen else 0.0
     return (
         (p[0] + a[0] * e, p[1] + a[1] * e, p[2] + a[2] * e),
         (v[0] + b[0] * e, v[1] + b[1] * e, v[2] + b[2] * e),
@@ -184,6 +183,6 @@ def _gain(p: Three, v: Three, A: Six, B: Nine, C: Six, a: Three, b: Three, s: fl
             C[3] - b[1] * m[1], C[4] - b[1] * m[2],
             C[5] - b[2] * m[2],
         ),
-        nis if good or not seen else math.nan,
+        math.nan if seen & (not good) else e * y,
         s if seen else 1.0,
     )  # fmt: skip
