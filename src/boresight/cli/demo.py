@@ -14,7 +14,7 @@ from boresight.io.files import output_folder
 from boresight.io.recording import write_recording
 from boresight.io.results import write_results
 from boresight.tracking.cache import compiling_beside
-from boresight.types import Results
+from boresight.types import Recording, Results
 
 SET = "P"
 DIMENSIONS = 3  # of the scenario
@@ -66,7 +66,8 @@ def demo(
                 _say(json, "compiling kernels beside, on the first run only (about a minute) …")
             _say(json, f"comparing the filter with the bound over {runs} runs …")
             rows = _table(runs, seed)
-        results = _tracked(folder, output, seed, rows)
+            recording = _simulated(folder, seed)
+        results = _tracked(recording, folder, output, seed, rows)
     report = output / "report.html"
     if json:
         print_json("demo", {"runs": runs, "seed": seed, "set": SET, "report": str(report)}, rows)
@@ -83,21 +84,29 @@ def _say(quiet: bool, text: str) -> None:
         print(f"boresight: {text}", file=sys.stderr, flush=True)
 
 
-def _tracked(folder: Path, output: Path, seed: int, bound: list[dict[str, Any]]) -> Results:
-    """Write scenario, recording, tracks and report into `folder`."""
+def _simulated(folder: Path, seed: int) -> Recording:
+    """Write scenario and recording into `folder`; loads what places the sensors, for the tracker."""
     import numpy as np
 
-    from boresight.cli.track import track_recording
     from boresight.config.scenario import read_scenario
-    from boresight.report.html import write_report
     from boresight.sim.scenario import simulate
-    from boresight.tracking.config import TrackerConfig
+    from boresight.tracking.warm import warm_poses
 
     with as_file(files("boresight.cli") / "demo.toml") as path:
         scenario, _ = read_scenario(path, seed)
         (folder / "scenario.toml").write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
     recording = simulate(scenario, np.random.default_rng(seed))
     write_recording(recording, folder / "recording")
+    warm_poses(recording)
+    return recording
+
+
+def _tracked(recording: Recording, folder: Path, output: Path, seed: int, bound: list[dict[str, Any]]) -> Results:
+    """Track the recording and write tracks and report into `folder`."""
+    from boresight.cli.track import track_recording
+    from boresight.report.html import write_report
+    from boresight.tracking.config import TrackerConfig
+
     results = track_recording(recording, TrackerConfig())
     results.summary["command"] = f"boresight demo -o {output} --seed {seed}"
     results.summary["recording_folder"] = str(output / "recording")

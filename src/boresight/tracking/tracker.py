@@ -119,7 +119,7 @@ class Tracker:
                 out.decisions.extend(one.decisions)
                 out.smoothed.extend(one.smoothed)
             return state, out
-        out = self._take(state, self._looks(scans))
+        out = self._take(state, self.looks(scans))
         unseen_rows = [row for scan in scans for row in scan.empty_rows]
         if unseen_rows:
             out.decisions.insert(0, unseen(unseen_rows))
@@ -174,8 +174,8 @@ class Tracker:
                 out.smoothed.append(Rows(**parts | {"track_id": number[shown]}))
         state.smoothed = max(state.smoothed, until)
 
-    def _looks(self, scans: Sequence[Scan]) -> Looks:
-        """Take the declared latencies off and place the sensors."""
+    def looks(self, scans: Sequence[Scan]) -> Looks:
+        """Return looks as the kernel takes them: the declared latencies taken off, the sensors placed."""
         count = np.array([len(scan.t) for scan in scans])
         first = np.concatenate([[0], np.cumsum(count)])
         sensor = np.array([scan.sensor for scan in scans])

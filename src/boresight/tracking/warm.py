@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from boresight.io.scans import iter_scans
 from boresight.tracking.config import TrackerConfig
+from boresight.tracking.run import tracker_for
 from boresight.tracking.tracker import Tracker
-from boresight.types import Component, Scan, Sensor, SensorKind
+from boresight.types import Component, Recording, Scan, Sensor, SensorKind
 
 
 def warm(dimensions: int, blobs: bool = False) -> None:
@@ -16,6 +18,14 @@ def warm(dimensions: int, blobs: bool = False) -> None:
     """
     for share in (0.0, 0.1) if blobs else (0.0,):
         _look(TrackerConfig(blob_share=share), dimensions)
+
+
+def warm_poses(recording: Recording) -> None:
+    """Place the sensors of the first look of each, for the same reason: that is done before the tracker's kernel."""
+    tracker, first = tracker_for(recording, TrackerConfig()), dict[int, Scan]()
+    for scan in iter_scans(recording):
+        first.setdefault(scan.sensor, scan)
+    tracker.looks(list(first.values()))
 
 
 def _look(config: TrackerConfig, dimensions: int) -> None:
