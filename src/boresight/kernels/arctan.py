@@ -15,7 +15,8 @@ from numba import njit
 from boresight.kernels.parts import PartCompiler
 
 FAST: dict[str, Any] = {"cache": True, "fastmath": {"contract"}, "error_model": "numpy"}
-INLINE: dict[str, Any] = {**FAST, "forceinline": True, "pipeline_class": PartCompiler}
+PASS: dict[str, Any] = {**FAST, "pipeline_class": PartCompiler}  # called by kernels only
+INLINE: dict[str, Any] = {**PASS, "forceinline": True}
 
 _PI, _HALF_PI, _QUARTER_PI = 3.141592653589793, 1.5707963267948966, 0.7853981633974483
 _TAN_EIGHTH = 0.41421356237309503  # tan(π/8)

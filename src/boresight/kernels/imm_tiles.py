@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numba import njit, types
 
-from boresight.kernels.arctan import FAST, INLINE, exponential
+from boresight.kernels.arctan import FAST, INLINE, PASS, exponential
 from boresight.kernels.blocks import ROWS, Belief, Nine, Six, Three, load, store
 from boresight.kernels.observation import IntArray
 from boresight.kernels.signatures import MATRIX, STACK, VECTOR
@@ -54,7 +54,7 @@ def between(s: float, a: Belief, b: Belief) -> Belief:
     return position, velocity, of_position, cross, of_velocity
 
 
-@njit(**FAST)
+@njit(**PASS)
 def mix_tile(b: FloatArray, other: FloatArray, weight: FloatArray, stay: float, come: float) -> None:
     """Mix two tiles; `weight` (WIDTH,) of the first becomes its predicted one.
 
@@ -73,7 +73,7 @@ def mix_tile(b: FloatArray, other: FloatArray, weight: FloatArray, stay: float, 
         weight[l] = predicted
 
 
-@njit(**FAST)
+@njit(**PASS)
 def weigh_tile(b: FloatArray, other: FloatArray, weight: FloatArray) -> None:
     """Weigh the two models of every track by their likelihoods of the last report, N(y; 0, S)."""
     for l in range(WIDTH):

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit, types
 
 from boresight.kernels.address import motion_at, observation_at
-from boresight.kernels.arctan import FAST, INLINE
+from boresight.kernels.arctan import FAST, INLINE, PASS
 from boresight.kernels.gaussian import joseph_update
 from boresight.kernels.observation import IntArray
 from boresight.kernels.signatures import MATRIX, VECTOR
@@ -60,7 +60,7 @@ def combine(f: SixNumbers, A: FloatArray, start: SixNumbers) -> SixNumbers:
     return total
 
 
-@njit(**FAST)
+@njit(**PASS)
 def advance(F: FloatArray, P: FloatArray, Q: FloatArray, T: FloatArray) -> None:
     """Overwrite `P` (6, 6) with F P Fᵀ + Q, exactly symmetric; `T` (6, 6) is scratch, for (F P)ᵀ."""
     for i in range(N):
@@ -98,7 +98,7 @@ def condition(x: FloatArray, P: FloatArray, h: SixNumbers, y: float, r: float) -
     return float(e * e)
 
 
-@njit(**FAST)
+@njit(**PASS)
 def take(x: FloatArray, P: FloatArray, m: int, y: FloatArray, H: FloatArray, R: FloatArray) -> float:
     """Condition on m rows: one after another where R is diagonal, else jointly; returns the NIS."""
     alone = True

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import njit, types
 
-from boresight.kernels.arctan import FAST, INLINE, near
+from boresight.kernels.arctan import FAST, INLINE, PASS, near
 from boresight.kernels.blocks import Belief, Nine, Six, Three, condition_rate, dot, move, spread
 from boresight.kernels.observation import CONTEXT_SIZE, NOISE, POSITION, ROTATION, VELOCITY
 from boresight.kernels.sight import polar, range_rate, turned_polar
@@ -64,7 +64,7 @@ def _predict_space(x: Any, P: Any, dt: float, q: float, moved: Any, spread: Any)
     return True
 
 
-@njit(**FAST)
+@njit(**PASS)
 def slopes(p: Three, v: Three, z: FloatArray, c: FloatArray, H: FloatArray) -> int:
     """Fill rows of `H` (m, 8), of the components that can be used: slope (6,), noise variance, innovation."""
     d = (p[0] - c[POSITION], p[1] - c[POSITION + 1], p[2] - c[POSITION + 2])
