@@ -14,7 +14,6 @@ from boresight.errors import UserError
 from boresight.filters import ekf
 from boresight.filters.stream import Reports, require_all
 from boresight.kernels import imm
-from boresight.kernels.imm_smoothing import imm_smooth
 from boresight.models import check
 from boresight.models.motion.base import SCALARS, KernelMotion
 from boresight.models.protocols import MeasurementModel
@@ -173,6 +172,8 @@ class InteractingModels:
         if lag is not None and not lag >= 0.0:
             raise UserError(f"lag must be at least 0 s, not {lag!r}")
         x, P, weights = np.empty_like(run.x), np.empty_like(run.P), np.empty_like(run.weights)
+        from boresight.kernels.imm_smoothing import imm_smooth  # compiled when it is imported
+
         imm_smooth(
             self.motions[0].kernel, self._parameters(), self.sizes, self.labels, self.rates, run.t, run.weights, run.X,
             run.PP, math.inf if lag is None else lag, run.x.shape[1], x, P, weights,

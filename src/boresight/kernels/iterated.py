@@ -6,11 +6,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import njit
 
 from boresight.kernels.gaussian import cholesky, joseph_update, solve_lower
 from boresight.kernels.options import PART
-from boresight.kernels.signatures import CONDITIONED, MATRIX, OBSERVATION, VECTOR
 from boresight.types.sensor import FloatArray
 
 
@@ -25,10 +24,7 @@ def mahalanobis(L: FloatArray, a: FloatArray) -> float:
     return s
 
 
-@njit(
-    CONDITIONED(OBSERVATION, VECTOR, MATRIX, VECTOR, VECTOR, types.int64),
-    cache=True,
-)
+@njit(**PART)
 def iterated_update(
     observe: Any, x: FloatArray, P: FloatArray, z: FloatArray, context: FloatArray, iterations: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, float, float]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from boresight.kernels import geodesy, rotation
 from boresight.kernels.options import PART
+from boresight.kernels.write import write_matrix
 from boresight.types.sensor import FloatArray
 
 _ecef_from_enu = geodesy.ecef_from_enu
@@ -192,10 +193,11 @@ def local_level(position: FloatArray, lat0: float, lon0: float, h0: float) -> Fl
     site = _ecef_from_enu_rotation(lat0, lon0)
     local = np.empty((3, 3))
     for k in range(len(position)):
-        if k > 0 and (position[k] == position[k - 1]).all():  # many detections of one look
-            out[k] = out[k - 1]
+        p, before = position[k], position[max(k - 1, 0)]
+        if k > 0 and p[0] == before[0] and p[1] == before[1] and p[2] == before[2]:  # many detections of one look
+            write_matrix(out[k], out[k - 1])
             continue
-        x, y, z = _ecef_from_enu(position[k, 0], position[k, 1], position[k, 2], lat0, lon0, h0)
+        x, y, z = _ecef_from_enu(p[0], p[1], p[2], lat0, lon0, h0)
         latitude, longitude, _ = _geodetic_from_ecef(x, y, z)
         _fill_rotation(math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude), local)
         for i in range(3):

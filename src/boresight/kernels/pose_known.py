@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from boresight.kernels.options import PART
 from boresight.kernels.pose import first_uncovered, interpolate_attitude, interpolate_position, segment, slopes
+from boresight.kernels.write import write_matrix, write_vector
 from boresight.types.sensor import FloatArray
 
 Flags = NDArray[np.bool_]
@@ -60,10 +61,10 @@ def known_positions(
             fitted = fitted.copy()
             for j in range(begin, n):
                 if not measured[j]:
-                    fitted[j - base] = slope[j - begin]
+                    write_vector(fitted[j - base], slope[j - begin])
         found = interpolate_position(nodes[base:n], position[base:n], fitted, hermite[base : max(n - 1, base)], times)
-        p[first[i] : first[i + 1]] = found[0]
-        v[first[i] : first[i + 1]] = found[1]
+        write_matrix(p[first[i] :], found[0])
+        write_matrix(v[first[i] :], found[1])
     return good, p, v
 
 
@@ -91,6 +92,7 @@ def known_attitudes(
             continue
         base = max(min(segment(nodes[:n], times.min()), n - 4), 0)
         found = interpolate_attitude(nodes[base:n], quaternion[base:n], steps[base : max(n - 1, base)], times)
-        R[first[i] : first[i + 1]] = found[0]
-        rate[first[i] : first[i + 1]] = found[1]
+        for k in range(len(times)):
+            write_matrix(R[first[i] + k], found[0][k])
+        write_matrix(rate[first[i] :], found[1])
     return good, R, rate

@@ -7,6 +7,7 @@ from numba import njit
 
 from boresight.kernels import rotation as one
 from boresight.kernels.geodesy import Arrays
+from boresight.kernels.write import write_matrix, write_vector
 from boresight.types.sensor import FloatArray
 
 _matrix_from_ypr = one.matrix_from_ypr
@@ -24,7 +25,7 @@ def matrix_from_ypr(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> Flo
     """Return rotations (n, 3, 3) of columns (n,)."""
     out = np.empty((len(yaw), 3, 3))
     for i in range(len(yaw)):
-        out[i] = _matrix_from_ypr(yaw[i], pitch[i], roll[i])
+        write_matrix(out[i], _matrix_from_ypr(yaw[i], pitch[i], roll[i]))
     return out
 
 
@@ -43,7 +44,7 @@ def quaternion_from_ypr(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) ->
     """Return unit quaternions (n, 4) of columns (n,)."""
     out = np.empty((len(yaw), 4))
     for i in range(len(yaw)):
-        out[i] = _quaternion_from_ypr(yaw[i], pitch[i], roll[i])
+        write_vector(out[i], _quaternion_from_ypr(yaw[i], pitch[i], roll[i]))
     return out
 
 
@@ -61,7 +62,7 @@ def quaternion_from_matrix(R: FloatArray) -> FloatArray:
     """Return unit quaternions (n, 4) of rotations (n, 3, 3)."""
     out = np.empty((len(R), 4))
     for i in range(len(R)):
-        out[i] = _quaternion_from_matrix(R[i])
+        write_vector(out[i], _quaternion_from_matrix(R[i]))
     return out
 
 
@@ -70,7 +71,7 @@ def multiply(p: FloatArray, q: FloatArray) -> FloatArray:
     """Return the products p q (n, 4)."""
     out = np.empty((len(p), 4))
     for i in range(len(p)):
-        out[i] = _multiply(p[i], q[i])
+        write_vector(out[i], _multiply(p[i], q[i]))
     return out
 
 
@@ -79,7 +80,7 @@ def slerp(p: FloatArray, q: FloatArray, fraction: FloatArray) -> FloatArray:
     """Return the attitudes (n, 4) at `fraction` (n,) of the way from `p` to `q` (n, 4)."""
     out = np.empty((len(p), 4))
     for i in range(len(p)):
-        out[i] = _slerp(p[i], q[i], fraction[i])
+        write_vector(out[i], _slerp(p[i], q[i], fraction[i]))
     return out
 
 
@@ -89,7 +90,7 @@ def steps_between(q: FloatArray) -> FloatArray:
     n = max(len(q) - 1, 0)
     out = np.empty((n, 3))
     for i in range(n):
-        out[i] = _step_between(q[i], q[i + 1])
+        write_vector(out[i], _step_between(q[i], q[i + 1]))
     return out
 
 

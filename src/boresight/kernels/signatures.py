@@ -9,5 +9,3 @@ MATRIX = types.float64[:, ::1]
 STACK = types.float64[:, :, ::1]
 MOTION = types.FunctionType(types.void(VECTOR, types.float64, VECTOR, VECTOR, MATRIX, MATRIX))
 OBSERVATION = types.FunctionType(types.int64(VECTOR, VECTOR, VECTOR, VECTOR, MATRIX, MATRIX))
-# What a conditioning kernel returns: x, P, S, normalised innovation squared, log likelihood
-CONDITIONED = types.Tuple((VECTOR, MATRIX, MATRIX, types.float64, types.float64))
