@@ -7,10 +7,19 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+from boresight.cli.track import loading
+from boresight.kernels.pose_known import known_positions
+from boresight.kernels.tracker_window import advance
 from boresight.tracking import cache
+from boresight.tracking.config import TrackerConfig
+from boresight.tracking.tracker import Tracker
+from boresight.tracking.warm import warm_poses, warm_tracker
+from boresight.types import Scan, Sensor, SensorKind
 
 
 def test_the_second_process_runs_both_trackers() -> None:
@@ -35,6 +44,33 @@ def test_waits_for_the_second_process_unless_the_body_fails(monkeypatch: pytest.
         raise KeyboardInterrupt
     time.sleep(1.0)
     assert not said.exists()  # it was stopped
+
+
+@pytest.mark.parametrize("config", [TrackerConfig(), TrackerConfig(blob_share=0.1)])
+def test_a_warmed_tracker_compiles_nothing_more(config: TrackerConfig) -> None:
+    sigma = np.array([1.0, 0.01, *[np.nan] * 5])
+    tracker = Tracker(config, (Sensor("r", SensorKind.RADAR, sigma=sigma),), 2)
+    z, R = sigma[None] * 100.0, np.diag(sigma**2)[None]
+    look = Scan(0, 0.0, 0.0, np.zeros(1), z, R, np.zeros(1, np.int64))
+    warm_poses(tracker, [])
+    warm_poses(tracker, [look])
+    warm_tracker(tracker)
+    kernels: tuple[Any, ...] = (advance, known_positions)
+    before = [len(kernel.signatures) for kernel in kernels]
+    tracker.step(tracker.init(), look)
+    assert [len(kernel.signatures) for kernel in kernels] == before
+
+
+@pytest.mark.parametrize(("there", "takes", "says"), [(False, 0.0, True), (True, 0.0, False), (True, 0.4, True)])
+def test_says_that_it_compiles_when_it_does(
+    there: bool, takes: float, says: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """At once where no kernel is in the cache; where one is, which may be another tracker's, once it takes long."""
+    monkeypatch.setattr(cache, "compiled", lambda: there)
+    monkeypatch.setattr("boresight.cli.track.LOADS_IN", 0.1)
+    with loading():
+        time.sleep(takes)
+    assert ("compiling kernels" in capsys.readouterr().err) == says
 
 
 def test_nothing_runs_where_the_kernels_are_compiled(monkeypatch: pytest.MonkeyPatch) -> None:

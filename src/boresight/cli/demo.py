@@ -13,6 +13,7 @@ from boresight.cli.output import print_json, print_table
 from boresight.io.files import output_folder
 from boresight.io.recording import write_recording
 from boresight.io.results import write_results
+from boresight.io.scans import iter_scans
 from boresight.tracking.cache import compiling_beside
 from boresight.types import Recording, Results
 
@@ -90,6 +91,8 @@ def _simulated(folder: Path, seed: int) -> Recording:
 
     from boresight.config.scenario import read_scenario
     from boresight.sim.scenario import simulate
+    from boresight.tracking.config import TrackerConfig
+    from boresight.tracking.run import tracker_for
     from boresight.tracking.warm import warm_poses
 
     with as_file(files("boresight.cli") / "demo.toml") as path:
@@ -97,7 +100,7 @@ def _simulated(folder: Path, seed: int) -> Recording:
         (folder / "scenario.toml").write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
     recording = simulate(scenario, np.random.default_rng(seed))
     write_recording(recording, folder / "recording")
-    warm_poses(recording)
+    warm_poses(tracker_for(recording, TrackerConfig()), iter_scans(recording))
     return recording
 
 

@@ -92,7 +92,7 @@ def _run(checked: Any, folder: Path, engine: str, workers: int, force: bool) -> 
         if done and wanted:
             _tell(f"going on after {len(done)} runs, {len(wanted)} to do")
         if wanted and engine == "local":
-            _warm(json_module.loads(checked.scenarios[0]).get("dimensions", 3))
+            _warm(checked)
         tasks = [checked.task(c, r) for c, r in wanted]
         with _progress(len(done) + len(wanted), len(done)) as tick:
             for _, row in run_all(engine, one_run, tasks, min(workers, max(len(tasks), 1)), _tell):
@@ -101,14 +101,19 @@ def _run(checked: Any, folder: Path, engine: str, workers: int, force: bool) -> 
         return journal.rows
 
 
-def _warm(dimensions: int) -> None:
+def _warm(checked: Any) -> None:
     """Compile the kernels once, here, so that the workers find them in the cache."""
     from boresight.cli.track import loading
 
     with loading():
-        from boresight.tracking.warm import warm
+        from boresight.study.plan import build
+        from boresight.tracking.tracker import Tracker
+        from boresight.tracking.warm import warm_tracker
 
-        warm(dimensions)
+        for cell in set(zip(checked.scenarios, checked.trackers, strict=True)):
+            scenario, config = build(json_module.loads(cell[0]), json_module.loads(cell[1]), 0, "study")
+            sensors = tuple(s.sensor for s in scenario.sensors)
+            warm_tracker(Tracker(config, sensors, scenario.dimensions))
 
 
 def _finish(checked: Any, folder: Path, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

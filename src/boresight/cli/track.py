@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import shlex
 import sys
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from boresight.tracking.tracker import Output, TrackerState
 
 LONGEST_LAG = 600.0  # s
+LOADS_IN = 4.0  # s: what takes longer is compiled
 BESIDE = "tracker.toml"  # a configuration that lies in the recording's folder is used unless --config names another
 
 
@@ -128,11 +130,12 @@ def track_recording(
         from boresight.config.stages import make_pipeline
         from boresight.tracking.registration import Diary
         from boresight.tracking.run import decision_rows, track_rows, tracker_for
-        from boresight.tracking.warm import warm
+        from boresight.tracking.warm import warm_poses, warm_tracker
 
-        warm(recording.dimensions)
-    tracker = tracker_for(recording, config, sensors)
-    scans = list(iter_scans(recording, sensors))
+        tracker = tracker_for(recording, config, sensors)
+        scans = list(iter_scans(recording, sensors))
+        warm_poses(tracker, scans)
+        warm_tracker(tracker)
     before = make_pipeline(stages or {}, recording, tracker.poses, tracker.used, where)
     started = time.perf_counter()
     with _progress(len(scans)) as tick:
@@ -209,12 +212,23 @@ def loading() -> Iterator[None]:
     """Say that kernels are loaded, and that the first run compiles them, while that goes on."""
     from boresight.tracking.cache import compiled
 
-    ready = compiled()
-    if not ready:
+    said = threading.Event()
+
+    def say() -> None:
+        said.set()
         print("boresight: compiling kernels, on the first run only (about a minute) …", file=sys.stderr, flush=True)
+
     started = time.perf_counter()
-    yield
-    if not ready:
+    late = threading.Timer(LOADS_IN, say)  # another tracker's kernel may be there, but not this one's
+    if compiled():
+        late.start()
+    else:
+        say()
+    try:
+        yield
+    finally:
+        late.cancel()
+    if said.is_set():
         print(f"boresight: compiled in {time.perf_counter() - started:.0f} s", file=sys.stderr, flush=True)
 
 
