@@ -90,6 +90,33 @@ def test_a_sensor_that_moves_no_tracks_is_evidence_alone() -> None:
     assert odds(state) > before
 
 
+@pytest.mark.parametrize("association", ["nearest", "jpda"])
+@pytest.mark.parametrize("share", [0.0, 0.1, 1.0])
+def test_an_eye_may_pass_over_what_does_not_move(share: float, association: str) -> None:
+    """A look's evidence is 1 - p + p L for a target, 1 - p' + p' L for an object, p' = share p; L from the former."""
+    used = tracker({"eye": SensorErrors(sees_static=share, moves_tracks=False, association=association)})
+    state = after(used, [[300.0, 400.0]])
+    w = state.window.tracks.weight[0]
+    for azimuth, t in (([], 10.0), ([np.arctan2(300.0, 400.0) + 0.005], 12.0)):
+        w[:] = 0.4, 0.0, 0.4, 0.2
+        state, _ = used.step(state, glance(t, azimuth))
+        w = state.window.tracks.weight[0]
+        target, thing = w[VISIBLE] / w[NOTHING] / 2.0, w[STATIC] / w[NOTHING] / 2.0
+        assert thing == pytest.approx(1.0 - share + share * target, rel=1e-6)
+        assert target == pytest.approx(1.0 - P_EYE, rel=1e-6) if t == 10.0 else target > 5.0
+
+
+@pytest.mark.parametrize("reach", [600.0, 400.0])
+def test_a_track_comes_up_at_any_sensors_look_within_the_report_range(reach: float) -> None:
+    used = tracker({"radar": SensorErrors(report_range=reach)})
+    state = after(used, [[300.0, 400.0]], looks=1)
+    tr = state.window.tracks
+    tr.weight[0] = 0.99, 0.0, 0.0, 0.01
+    assert tr.life[0, 2] == 0.0
+    state, _ = used.step(state, glance(0.5, [np.arctan2(300.0, 400.0)]))
+    assert state.window.tracks.life[0, 2] == (reach > 500.0)
+
+
 @pytest.mark.parametrize(("lonely", "fate"), [(True, Fate.UNASSOCIATED), (False, Fate.UPDATED)])
 def test_a_bearing_that_two_tracks_could_claim_is_nobodys(lonely: bool, fate: Fate) -> None:
     used = tracker(lonely_bearings=lonely)

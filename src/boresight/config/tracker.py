@@ -59,6 +59,7 @@ SENSOR_KEYS = {
     "resolution_m": ("resolution", 1.0),
     "report_range_m": ("report_range", 1.0),
     "moves_tracks": ("moves_tracks", 1.0),
+    "sees_static": ("sees_static", 1.0),
     "association": ("association", 1.0),
 }
 
@@ -114,6 +115,7 @@ class ErrorsTable(TableModel, frozen=True):
     resolution_m: float | None = None
     report_range_m: float | None = None
     moves_tracks: bool | None = None
+    sees_static: float | None = None
     association: str | None = None
 
 

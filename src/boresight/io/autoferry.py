@@ -81,12 +81,12 @@ speed_sigma_m_s = 4.5
 birth_rate = 0.005
 targets_at_start = 2.0
 show_time_s = 5.0
-static_share = 0.2
-static_wander_m2_s = 0.2
-stop_floor = 0.005
-doubt = 0.01
-confirm_above = 0.95
-hide_below = 0.4
+static_share = 0.3
+static_wander_m2_s = 0.1
+stop_floor = 0.003
+doubt = 0.02
+confirm_above = 0.98
+hide_below = 0.35
 merge_distance_m = 15.0
 apart_m = 22.0
 blob_share = 0.1
@@ -108,17 +108,19 @@ report_range_m = 0.0        # begins and moves tracks; they are shown when the r
 
 [[sensor]]
 id = "ir"
-bias_azimuth_deg = 3.5      # of the kind that no two bearings agree on: evidence, not position
+bias_azimuth_deg = 2.0      # of the kind that no two bearings agree on: evidence, not position
 bias_time_s = 30.0
 decorrelation_s = 1.4
 moves_tracks = false
+sees_static = 0.05          # it was trained on boats, and passes over what stands about
 
 [[sensor]]
 id = "eo"
-bias_azimuth_deg = 3.5
+bias_azimuth_deg = 2.0
 bias_time_s = 30.0
 decorrelation_s = 1.4
 moves_tracks = false
+sees_static = 0.05
 """
 
 

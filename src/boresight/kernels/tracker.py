@@ -87,6 +87,7 @@ class SensorTable(NamedTuple):
     resolution: float  # m: nearer targets may give one detection together
     report_range: float  # m: targets farther from the sensor are tracked but not shown on its word
     moves_tracks: bool  # False: its detections are evidence that a track exists, but do not move it
+    sees_static: float  # detection probability of an object that does not move, as a share of a target's
     joint: bool  # tracks share its detections (JPDA) instead of taking one each
 
 

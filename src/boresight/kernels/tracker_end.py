@@ -25,7 +25,11 @@ from boresight.kernels.tracker_copies import put1, put2, put3, put_models
 
 @njit(**PART)
 def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look, extras: Extras) -> None:
-    """Show the tracks that are probably moving targets within the range for which the sensor answers."""
+    """Show the tracks that are probably moving targets within the range for which the sensor answers.
+
+    Bearings have no such range of their own: theirs is the longest of the ranging sensors.
+    """
+    reach = sensor.report_range if sensor.ranging else s.farthest_report
     last = len(look.dt)
     for i in range(tr.live[0]):
         gap = 0.0
@@ -33,11 +37,11 @@ def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look, extras: Extra
             gap += (tr.x[i, a] - look.sensor_position[last, a]) ** 2
         target = tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN]
         if tr.life[i, 2] > 0.0:
-            if sensor.report_range == s.farthest_report and gap > (1.1 * sensor.report_range) ** 2:
+            if reach == s.farthest_report and gap > (1.1 * reach) ** 2:
                 if extras is not None:
                     save_lesson(tr, i, s)
                 tr.life[i, 2] = 0.0
-        elif target > s.show_above and gap < sensor.report_range**2 and (tr.heard[i] == 0 or stands_apart(tr, i, s)):
+        elif target > s.show_above and gap < reach**2 and (tr.heard[i] == 0 or stands_apart(tr, i, s)):
             tr.life[i, 2] = 1.0
 
 

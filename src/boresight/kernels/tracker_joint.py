@@ -75,10 +75,12 @@ def take_shares(
     `own` is the detection that is most likely its own (-1: none): it counts as a hit and conditions the anchor.
     """
     visible = 1.0 - p_d
-    still = 1.0 - p_d
+    still = 1.0 - p_d * sensor.sees_static
     for e in range(start[i], start[i + 1]):
         visible += share[e]
-        still += share[e] * still_ratio(tr, i, s, sensor, look, column[e], at, room, column[e] == own)
+        still += (
+            sensor.sees_static * share[e] * still_ratio(tr, i, s, sensor, look, column[e], at, room, column[e] == own)
+        )
     moves = sensor.moves_tracks and (sensor.ranging or tr.heard[i] > 0)
     if moves:
         mix(tr, i, s, sensor, look, room, start, column, share, visible, models)

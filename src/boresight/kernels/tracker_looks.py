@@ -76,6 +76,7 @@ def sensor_at(sensors: Any, i: int) -> SensorTable:
         sensors.resolution[i],
         sensors.report_range[i],
         sensors.moves_tracks[i],
+        sensors.sees_static[i],
         sensors.joint[i],
     )
 

@@ -103,20 +103,22 @@ def scan_step(
         if extras is not None and (sensor.joint or (tr.heard[i] == 0 and not sensor.ranging)):
             take_shares(tr, i, s, sensor, look, at, room, start, column, share, k, p_d[i], temper, models)
             continue
+        log_visible = evidence(i, start, column, loglik, row_of_col, p_d[i])
+        log_static = log_visible
+        if sensor.sees_static < 1.0:
+            log_static = evidence(i, start, column, loglik, row_of_col, p_d[i] * sensor.sees_static)
         if k >= 0:
-            log_visible = evidence(i, start, column, loglik, row_of_col, p_d[i])
-            take(tr, i, s, sensor, look, k, at, room, log_visible, temper, models)
+            take(tr, i, s, sensor, look, k, at, room, log_visible, log_static, temper, models)
         else:
-            log_any = evidence(i, start, column, loglik, row_of_col, p_d[i])
-            weigh(tr, i, log_any, log_any, temper)
+            weigh(tr, i, log_visible, log_static, temper)
     if extras is not None and s.blob_share > 0.0 and unplaced(tr):
         keep_beside(tr, s, sensor, look, col_of_row, usable, room, models)
     learn_clutter(tr, s, sensor, look, claims, row_of_col, usable)
     if sensor.ranging:
         begin(tr, s, sensor, look, fate, owner, row_of_col, usable, at, room, extras, models)
-        show(tr, s, sensor, look, extras)
     elif extras is not None and s.blob_share > 0.0 and m > 1:
         begin_beside(tr, s, sensor, look, fate, owner, usable, room, models)
+    show(tr, s, sensor, look, extras)
     end_and_merge(tr, s, sensor.ranging, start, extras, models)
     tr.live[1] += 1
 

@@ -223,11 +223,11 @@ def take(
     at: Places,
     room: Workroom,
     log_visible: float,
+    log_static: float,
     temper: float,
     models: Models | None,
 ) -> None:
     """Condition track `i` on detection `k`: state, anchor and hypotheses."""
-    log_static = log_visible
     if at.there[k]:
         moving = moving_likelihood(tr, i, s, sensor, look, k, at, room)
         log_static += static_likelihood(tr, i, s, room.fix, at.covariance[k], room) - moving

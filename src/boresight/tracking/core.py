@@ -102,6 +102,7 @@ def _table(
         resolution=errors.resolution,
         report_range=errors.report_range,
         moves_tracks=errors.moves_tracks,
+        sees_static=errors.sees_static,
         joint=joint,
     )
 
