@@ -108,7 +108,7 @@ report_range_m = 0.0        # begins and moves tracks; they are shown when the r
 
 [[sensor]]
 id = "ir"
-bias_azimuth_deg = 2.0      # of the kind that no two bearings agree on: evidence, not position
+bias_azimuth_deg = 3.0      # of the kind that no two bearings agree on: evidence, not position
 bias_time_s = 30.0
 decorrelation_s = 1.4
 moves_tracks = false
@@ -116,7 +116,7 @@ sees_static = 0.05          # it was trained on boats, and passes over what stan
 
 [[sensor]]
 id = "eo"
-bias_azimuth_deg = 2.0
+bias_azimuth_deg = 3.0
 bias_time_s = 30.0
 decorrelation_s = 1.4
 moves_tracks = false

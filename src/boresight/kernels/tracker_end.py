@@ -32,16 +32,18 @@ def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look, extras: Extra
     reach = sensor.report_range if sensor.ranging else s.farthest_report
     last = len(look.dt)
     for i in range(tr.live[0]):
+        target = tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN]
+        if tr.life[i, 2] == 0.0 and not target > s.show_above:
+            continue
         gap = 0.0
         for a in range(s.d):
             gap += (tr.x[i, a] - look.sensor_position[last, a]) ** 2
-        target = tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN]
         if tr.life[i, 2] > 0.0:
             if reach == s.farthest_report and gap > (1.1 * reach) ** 2:
                 if extras is not None:
                     save_lesson(tr, i, s)
                 tr.life[i, 2] = 0.0
-        elif target > s.show_above and gap < reach**2 and (tr.heard[i] == 0 or stands_apart(tr, i, s)):
+        elif gap < reach**2 and (tr.heard[i] == 0 or stands_apart(tr, i, s)):
             tr.life[i, 2] = 1.0
 
 

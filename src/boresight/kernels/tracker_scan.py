@@ -103,10 +103,7 @@ def scan_step(
         if extras is not None and (sensor.joint or (tr.heard[i] == 0 and not sensor.ranging)):
             take_shares(tr, i, s, sensor, look, at, room, start, column, share, k, p_d[i], temper, models)
             continue
-        log_visible = evidence(i, start, column, loglik, row_of_col, p_d[i])
-        log_static = log_visible
-        if sensor.sees_static < 1.0:
-            log_static = evidence(i, start, column, loglik, row_of_col, p_d[i] * sensor.sees_static)
+        log_visible, log_static = evidence(i, start, column, loglik, row_of_col, p_d[i], sensor.sees_static)
         if k >= 0:
             take(tr, i, s, sensor, look, k, at, room, log_visible, log_static, temper, models)
         else:

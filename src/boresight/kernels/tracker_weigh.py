@@ -19,14 +19,22 @@ LOG_2PI = math.log(2.0 * math.pi)
 
 
 @njit(**LEAF)
-def evidence(i: int, start: IntArray, column: IntArray, loglik: FloatArray, row_of_col: IntArray, p_d: float) -> float:
-    """Log-likelihood of this look if track `i` is a visible target, over that if it is not: missed, or any of the
-    detections in its gate that no other track took (Musicki, Evans, Stankovic 1994, the IPDA likelihood ratio)."""
-    total = 1.0 - p_d
+def evidence(
+    i: int, start: IntArray, column: IntArray, loglik: FloatArray, row_of_col: IntArray, p_d: float, share: float
+) -> tuple[float, float]:
+    """Log-likelihoods of this look if track `i` is a visible target, and if it is an object that does not move.
+
+    Over that if it is nothing: missed, or any of the detections in its gate that no other track took (Musicki, Evans,
+    Stankovic 1994, the IPDA likelihood ratio). The object is detected with `share` of the probability `p_d`.
+    """
+    ratio = 0.0
     for e in range(start[i], start[i + 1]):
         if row_of_col[column[e]] == i or row_of_col[column[e]] < 0:
-            total += p_d * math.exp(min(loglik[e], 100.0))
-    return math.log(total)
+            ratio += math.exp(min(loglik[e], 100.0))
+    visible = math.log(1.0 - p_d + p_d * ratio)
+    if share == 1.0:
+        return visible, visible
+    return visible, math.log(1.0 - share * p_d + share * p_d * ratio)
 
 
 @njit(**LEAF)
