@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numba import typeof
 
 from boresight.cli.track import loading
-from boresight.kernels.pose_known import known_positions
 from boresight.kernels.tracker_window import advance
 from boresight.tracking import cache
 from boresight.tracking.config import TrackerConfig
@@ -46,19 +46,41 @@ def test_waits_for_the_second_process_unless_the_body_fails(monkeypatch: pytest.
     assert not said.exists()  # it was stopped
 
 
-@pytest.mark.parametrize("config", [TrackerConfig(), TrackerConfig(blob_share=0.1)])
-def test_a_warmed_tracker_compiles_nothing_more(config: TrackerConfig) -> None:
+@pytest.mark.parametrize(
+    "config", [TrackerConfig(), TrackerConfig(blob_share=0.1), TrackerConfig(q=0.1, q_manoeuvre=5.0)]
+)
+def test_a_warmed_tracker_compiles_nothing_more(config: TrackerConfig, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The kernel is called with arguments of the types that a look has, which is what it is compiled for."""
+    called: list[tuple[Any, ...]] = []
+
+    def watched(*arguments: Any) -> int:
+        called.append(tuple(typeof(a) for a in arguments))
+        return int(advance(*arguments))
+
+    monkeypatch.setattr("boresight.tracking.window.advance", watched)
     sigma = np.array([1.0, 0.01, *[np.nan] * 5])
     tracker = Tracker(config, (Sensor("r", SensorKind.RADAR, sigma=sigma),), 2)
-    z, R = sigma[None] * 100.0, np.diag(sigma**2)[None]
-    look = Scan(0, 0.0, 0.0, np.zeros(1), z, R, np.zeros(1, np.int64))
-    warm_poses(tracker, [])
-    warm_poses(tracker, [look])
+    look = Scan(0, 0.0, 0.0, np.zeros(1), sigma[None] * 100.0, np.diag(sigma**2)[None], np.zeros(1, np.int64))
     warm_tracker(tracker)
-    kernels: tuple[Any, ...] = (advance, known_positions)
-    before = [len(kernel.signatures) for kernel in kernels]
+    warmed = set(called)
+    called.clear()
     tracker.step(tracker.init(), look)
-    assert [len(kernel.signatures) for kernel in kernels] == before
+    assert called
+    assert set(called) == warmed
+
+
+def test_poses_are_warmed_by_the_first_look_of_each_sensor(monkeypatch: pytest.MonkeyPatch) -> None:
+    sigma = np.array([1.0, 0.01, *[np.nan] * 5])
+    tracker = Tracker(TrackerConfig(), tuple(Sensor(n, SensorKind.RADAR, sigma=sigma) for n in "ab"), 2)
+    scans = [
+        Scan(i, t, t, np.zeros(1), sigma[None], np.diag(sigma**2)[None], np.zeros(1, np.int64))
+        for t, i in ((0.0, 1), (1.0, 0), (2.0, 1))
+    ]
+    placed = []
+    monkeypatch.setattr(Tracker, "looks", lambda _, found: placed.append(found))
+    warm_poses(tracker, [])
+    warm_poses(tracker, scans)
+    assert placed == [scans[:2]]
 
 
 @pytest.mark.parametrize(("there", "takes", "says"), [(False, 0.0, True), (True, 0.0, False), (True, 0.4, True)])

@@ -34,7 +34,15 @@ def test_a_value_out_of_range_is_named(values: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(
-    "values", [{"bias_time": 0.0}, {"fade_range": 0.0}, {"bias_range": float("inf")}, {"decorrelation": float("nan")}]
+    "values",
+    [
+        {"bias_time": 0.0},
+        {"fade_range": 0.0},
+        {"bias_range": float("inf")},
+        {"decorrelation": float("nan")},
+        {"sees_static": 1.5},
+        {"sees_static": -0.1},
+    ],
 )
 def test_of_a_sensor_too(values: dict[str, float]) -> None:
     with pytest.raises(UserError, match=rf"sensor\['ir'\]: {next(iter(values))}"):
