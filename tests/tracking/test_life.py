@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from boresight.frames.pose import pose_track
 from boresight.kernels.tracker import AZIMUTH_BINS, NOTHING, STATIC, VISIBLE
 from boresight.kernels.tracker_end import end_and_merge
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.tracking.tracker import Tracker, TrackerState
-from boresight.types import FATES, Coverage, Fate, Scan, Sensor, SensorKind
+from boresight.types import FATES, Axes, Coverage, Fate, PlatformTrack, Scan, Sensor, SensorKind
 from tests.tracking.conftest import whole
 from tests.tracking.test_rules import points, sensor
 
@@ -115,6 +116,45 @@ def test_a_track_comes_up_at_any_sensors_look_within_the_report_range(reach: flo
     assert tr.life[0, 2] == 0.0
     state, _ = used.step(state, glance(0.5, [np.arctan2(300.0, 400.0)]))
     assert state.window.tracks.life[0, 2] == (reach > 500.0)
+
+
+NORTH, STILL = np.tile([0.0, 900.0, 0.0], (21, 1)), np.zeros((21, 3))
+AWAY = {
+    "away": pose_track(PlatformTrack("away", np.arange(21.0), NORTH, STILL, STILL, np.zeros(21), np.zeros(21))),
+}
+SHORT = {"radar": SensorErrors(report_range=400.0), "away": SensorErrors(report_range=400.0)}
+
+
+def test_the_report_range_is_the_radars_wherever_the_eye_stands() -> None:
+    """An eye 900 m from the radar neither hides what the radar shows, nor shows what lies near itself alone."""
+    eye = sensor("eye", SensorKind.OPTICAL, p_detection=P_EYE, platform="away", axes=Axes.PLATFORM_ENU)
+    used = Tracker(
+        TrackerConfig(q=0.1, static_share=0.0, stop_floor=0.0, sensors=SHORT, **FOR_EVER),
+        (sensor("radar"), eye),
+        2,
+        AWAY,
+    )
+    state = after(used, [[0.0, 300.0], [0.0, 800.0]])
+    for t in (10.0, 10.5):
+        state, _ = used.step(state, glance(t, [0.0]))
+        tracks = state.window.tracks
+        assert tracks.live[0] == 2
+        np.testing.assert_array_equal(tracks.life[:2, 2], tracks.x[:2, 1] < 500.0)
+
+
+def test_two_radars_do_not_hide_each_others_tracks() -> None:
+    sensors = sensor("radar"), sensor("away", platform="away", axes=Axes.PLATFORM_ENU)
+    used = Tracker(TrackerConfig(q=0.1, static_share=0.0, stop_floor=0.0, sensors=SHORT, **FOR_EVER), sensors, 2, AWAY)
+    places = [[0.0, 300.0], [0.0, 800.0], [450.0, 450.0]]
+    state = after(used, places)
+    for t in (11.0, 12.0, 13.0):
+        index = int(t) % 2
+        here = [[e, n - 900.0 * index] for e, n in places]
+        state, _ = used.step(state, points(t, here, index, int(100 * t)))
+        tracks = state.window.tracks
+        shown = tracks.life[: tracks.live[0], 2]
+        assert tracks.live[0] == 3
+        np.testing.assert_array_equal(shown, tracks.x[:3, 0] < 100.0)  # 636 m from both: nobody answers for that
 
 
 @pytest.mark.parametrize(("lonely", "fate"), [(True, Fate.UNASSOCIATED), (False, Fate.UPDATED)])

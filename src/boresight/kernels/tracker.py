@@ -40,7 +40,7 @@ class Tracks(NamedTuple):
     anchor: FloatArray  # (cap, 3) the position of the object if it does not move, m
     anchor_P: FloatArray  # (cap, 3, 3)
     life: FloatArray  # (cap, 4) time of birth, time of last hit, shown (0 or 1), hits
-    last_look: FloatArray  # (n_sensors,) s
+    last_look: FloatArray  # (n_sensors, 4) its time, s, and where the sensor stood, m
     clutter: FloatArray  # (n_sensors, AZIMUTH_BINS + 1) mean false detections of a look, per azimuth bin and in all
     heard: IntArray  # (cap,) bit i set: sensor i has moved the track
     beside: IntArray  # (cap,) birth of the track beside which bearings began this one; its anchor is relative to that
@@ -85,7 +85,6 @@ class SensorTable(NamedTuple):
     decorrelation: float  # s: looks closer in time than this are not independent evidence of existence
     fade_range: float  # m: where p_detection has fallen to half
     resolution: float  # m: nearer targets may give one detection together
-    report_range: float  # m: targets farther from the sensor are tracked but not shown on its word
     moves_tracks: bool  # False: its detections are evidence that a track exists, but do not move it
     sees_static: float  # detection probability of an object that does not move, as a share of a target's
     joint: bool  # tracks share its detections (JPDA) instead of taking one each
@@ -113,7 +112,7 @@ class Settings(NamedTuple):
     bias_sigma: FloatArray  # (n - 2d,)
     bias_tau: FloatArray  # (n - 2d,), infinite for the constant errors, which come last
     n_constant: int  # states that are constant errors of sensors
-    farthest_report: float  # m, the largest report range of the sensors in use
+    report_range: FloatArray  # (n_sensors,) m: targets farther from all sensors are tracked but not shown
     merge_distance: float
     apart: float  # m: a track nearer than this to a shown one is not shown beside it
     lonely_bearings: bool  # bearings update only where nobody else could claim them

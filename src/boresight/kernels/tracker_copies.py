@@ -40,7 +40,7 @@ class Copies(NamedTuple):
     # of each copy
     live: IntArray  # (C, 2)
     time: FloatArray  # (C, 1)
-    last_look: FloatArray  # (C, S)
+    last_look: FloatArray  # (C, S, 4)
     clutter: FloatArray  # (C, S, bins)
     bank: FloatArray  # (C, k, k + 1)
     undetected: FloatArray  # (C, 1)
@@ -106,7 +106,7 @@ def keep(copies: Copies, tr: Tracks, t: float, number: int, models: Models | Non
     copies.first[c + 1] = a + n
     put1(copies.live[c], 0, tr.live, 0, len(tr.live))
     put1(copies.time[c], 0, tr.time, 0, len(tr.time))
-    put1(copies.last_look[c], 0, tr.last_look, 0, len(tr.last_look))
+    put2(copies.last_look[c], 0, tr.last_look, 0, len(tr.last_look))
     put2(copies.clutter[c], 0, tr.clutter, 0, len(tr.clutter))
     put2(copies.bank[c], 0, tr.bank, 0, len(tr.bank))
     put1(copies.undetected[c], 0, tr.undetected, 0, len(tr.undetected))
@@ -132,7 +132,7 @@ def restore(copies: Copies, c: int, tr: Tracks, models: Models | None) -> None:
     n = copies.first[c + 1] - a
     put1(tr.live, 0, copies.live[c], 0, len(tr.live))
     put1(tr.time, 0, copies.time[c], 0, len(tr.time))
-    put1(tr.last_look, 0, copies.last_look[c], 0, len(tr.last_look))
+    put2(tr.last_look, 0, copies.last_look[c], 0, len(tr.last_look))
     put2(tr.clutter, 0, copies.clutter[c], 0, len(tr.clutter))
     put2(tr.bank, 0, copies.bank[c], 0, len(tr.bank))
     put1(tr.undetected, 0, copies.undetected[c], 0, len(tr.undetected))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -13,9 +15,7 @@ from boresight.kernels.tracker import (
     VISIBLE,
     Extras,
     IntArray,
-    Look,
     Models,
-    SensorTable,
     Settings,
     Tracks,
 )
@@ -24,27 +24,36 @@ from boresight.kernels.tracker_copies import put1, put2, put3, put_models
 
 
 @njit(**PART)
-def show(tr: Tracks, s: Settings, sensor: SensorTable, look: Look, extras: Extras) -> None:
-    """Show the tracks that are probably moving targets within the range for which the sensor answers.
-
-    Bearings have no such range of their own: theirs is the longest of the ranging sensors.
-    """
-    reach = sensor.report_range if sensor.ranging else s.farthest_report
-    last = len(look.dt)
+def show(tr: Tracks, s: Settings, extras: Extras) -> None:
+    """Show the tracks that are probably moving targets within the report range, and no longer those that left it."""
     for i in range(tr.live[0]):
         target = tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN]
         if tr.life[i, 2] == 0.0 and not target > s.show_above:
             continue
-        gap = 0.0
-        for a in range(s.d):
-            gap += (tr.x[i, a] - look.sensor_position[last, a]) ** 2
         if tr.life[i, 2] > 0.0:
-            if reach == s.farthest_report and gap > (1.1 * reach) ** 2:
+            if not reported(tr, i, s, 1.1):
                 if extras is not None:
                     save_lesson(tr, i, s)
                 tr.life[i, 2] = 0.0
-        elif gap < reach**2 and (tr.heard[i] == 0 or stands_apart(tr, i, s)):
+        elif reported(tr, i, s, 1.0) and (tr.heard[i] == 0 or stands_apart(tr, i, s)):
             tr.life[i, 2] = 1.0
+
+
+@njit(**LEAF)
+def reported(tr: Tracks, i: int, s: Settings, stretch: float) -> bool:
+    """Whether a track lies within `stretch` times the report range of any sensor, where that last stood."""
+    for j in range(len(s.report_range)):
+        reach = stretch * s.report_range[j]
+        if reach == 0.0:  # it answers for none, or has no range
+            continue
+        if reach == math.inf:
+            return True
+        gap = 0.0
+        for a in range(s.d):
+            gap += (tr.x[i, a] - tr.last_look[j, 1 + a]) ** 2
+        if gap < reach**2:
+            return True
+    return False
 
 
 @njit(**LEAF)

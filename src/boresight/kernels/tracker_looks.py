@@ -74,7 +74,6 @@ def sensor_at(sensors: Any, i: int) -> SensorTable:
         sensors.decorrelation[i],
         sensors.fade_range[i],
         sensors.resolution[i],
-        sensors.report_range[i],
         sensors.moves_tracks[i],
         sensors.sees_static[i],
         sensors.joint[i],

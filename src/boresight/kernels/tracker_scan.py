@@ -73,7 +73,7 @@ def scan_step(
             row_of_col[col_of_row[i]] = i
     claims = np.zeros(m, np.int64)
     count_claims(tr, start, column, claims)
-    temper = independence(tr, sensor, look.t)
+    temper = independence(tr, sensor, look)
     share = loglik
     if extras is not None and (sensor.joint or (s.blob_share > 0.0 and not sensor.ranging and unplaced(tr))):
         share = shares(tr, s, start, column, loglik, p_d, m)
@@ -115,7 +115,7 @@ def scan_step(
         begin(tr, s, sensor, look, fate, owner, row_of_col, usable, at, room, extras, models)
     elif extras is not None and s.blob_share > 0.0 and m > 1:
         begin_beside(tr, s, sensor, look, fate, owner, usable, room, models)
-    show(tr, s, sensor, look, extras)
+    show(tr, s, extras)
     end_and_merge(tr, s, sensor.ranging, start, extras, models)
     tr.live[1] += 1
 
@@ -147,10 +147,13 @@ def count_claims(tr: Tracks, start: IntArray, column: IntArray, claims: IntArray
 
 
 @njit(**LEAF)
-def independence(tr: Tracks, sensor: SensorTable, t: float) -> float:
-    """Return how much of a look at time `t` (s) is new evidence since the sensor's last one, 0 to 1, and note it."""
-    elapsed = t - tr.last_look[sensor.number]
-    tr.last_look[sensor.number] = t
+def independence(tr: Tracks, sensor: SensorTable, look: Look) -> float:
+    """Return how much of a look is new evidence since the sensor's last one, 0 to 1, and note its time and place."""
+    last = tr.last_look[sensor.number]
+    elapsed = look.t - last[0]
+    last[0] = look.t
+    for a in range(3):
+        last[1 + a] = look.sensor_position[len(look.dt), a]
     return min(1.0, max(elapsed, 0.0) / sensor.decorrelation) if sensor.decorrelation > 0.0 else 1.0
 
 

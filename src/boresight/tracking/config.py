@@ -47,7 +47,7 @@ class SensorErrors:
     moves_tracks: bool = True  # False: its detections are evidence that a track exists, but do not move it
     sees_static: float = 1.0  # detection probability of objects that do not move, as a share of that of targets
     association: str | None = None  # "nearest" or "jpda" for this sensor's detections (None: as the tracker's)
-    report_range: float = float("inf")  # m: farther targets are tracked but not shown (ranging sensors)
+    report_range: float = float("inf")  # m: targets farther from all ranging sensors are not shown
 
 
 @dataclass(frozen=True, slots=True)

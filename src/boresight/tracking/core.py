@@ -49,6 +49,7 @@ def make_plan(
     tau: list[float] = []
     tables = []
     constants = [np.full(N_PARAMETERS, -1, np.int64) for _ in sensors]  # filled when the number of biases is known
+    report_range = np.zeros(len(sensors))
     known: list[tuple[float, tuple[int, int]]] = []  # sigma, (sensor, parameter) of the constant errors
     for index, sensor in enumerate(sensors):
         errors = config.sensors.get(sensor.id, SensorErrors())
@@ -67,7 +68,9 @@ def make_plan(
         constants[index][parameter] = 2 * d + len(sigma) - len(known) + place
     tables = [t._replace(registers=bool((t.constant >= 0).any())) for t in tables]
     ranging = [t for t in tables if t.ranging and (used is None or t.number in used)]
-    settings = _settings(config, d, np.array(sigma), np.array(tau), len(known), ranging)
+    for table in ranging:
+        report_range[table.number] = config.sensors.get(sensors[table.number].id, SensorErrors()).report_range
+    settings = _settings(config, d, np.array(sigma), np.array(tau), len(known), ranging, report_range)
     n = 2 * d + len(sigma)
     extras = bool(known or config.blob_share > 0.0 or any(t.joint for t in tables)) or None
     models = _models(config, settings.q)
@@ -100,7 +103,6 @@ def _table(
         decorrelation=errors.decorrelation,
         fade_range=errors.fade_range,
         resolution=errors.resolution,
-        report_range=errors.report_range,
         moves_tracks=errors.moves_tracks,
         sees_static=errors.sees_static,
         joint=joint,
@@ -114,8 +116,9 @@ def _settings(
     bias_tau: FloatArray,
     n_constant: int,
     ranging: Sequence[SensorTable],
+    report_range: FloatArray,
 ) -> Settings:
-    """Pack the settings; `ranging` are the ranging sensors in use."""
+    """Pack the settings; `ranging` are the ranging sensors in use, `report_range` (n_sensors,) theirs, 0 of others."""
     flat = d == 2
     return Settings(
         d=d,
@@ -137,7 +140,7 @@ def _settings(
         bias_sigma=bias_sigma,
         bias_tau=bias_tau,
         n_constant=n_constant,
-        farthest_report=max([t.report_range for t in ranging], default=0.0),
+        report_range=report_range,
         merge_distance=config.merge_distance if config.merge_distance is not None else (10.0 if flat else 30.0),
         apart=config.apart,
         lonely_bearings=config.lonely_bearings,
@@ -204,7 +207,7 @@ def _before_all(settings: Settings, sensors: Sequence[SensorTable], n: int, mode
         anchor=np.zeros((0, 3)),
         anchor_P=np.zeros((0, 3, 3)),
         life=np.zeros((0, 4)),
-        last_look=np.full(len(sensors), -np.inf),
+        last_look=np.full((len(sensors), 4), -np.inf),
         clutter=clutter,
         heard=np.zeros(0, np.int64),
         beside=np.zeros(0, np.int64),

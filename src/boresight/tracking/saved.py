@@ -21,7 +21,7 @@ from boresight.tracking.tracker import Tracker, TrackerState
 from boresight.tracking.window import Window, held
 
 Arrays = dict[str, NDArray[np.generic]]
-FORMAT = 4
+FORMAT = 5
 
 
 def snapshot(state: TrackerState) -> TrackerState:
