@@ -81,14 +81,15 @@ speed_sigma_m_s = 4.5
 birth_rate = 0.005
 targets_at_start = 2.0
 show_time_s = 5.0
+survival_time_s = 300.0
 static_share = 0.3
 static_wander_m2_s = 0.1
-stop_floor = 0.003
-doubt = 0.02
-confirm_above = 0.98
-hide_below = 0.35
-merge_distance_m = 15.0
-apart_m = 22.0
+stop_floor = 0.004
+doubt = 0.025
+confirm_above = 0.985
+hide_below = 0.4
+merge_distance_m = 16.0
+apart_m = 23.0
 blob_share = 0.1
 clutter_memory_looks = 15.0
 
@@ -97,7 +98,7 @@ id = "radar"
 bias_position_m = 1.3
 bias_time_s = 30.0
 resolution_m = 23.0
-report_range_m = 250.0
+report_range_m = 310.0
 
 [[sensor]]
 id = "lidar"
