@@ -1,11 +1,15 @@
-"""Settings outside their range are named."""
+"""Settings outside their range are named; those of a file arrive in SI units."""
 
 from __future__ import annotations
 
+import dataclasses
+import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from boresight.config.tracker import SENSOR_KEYS, read_tracker_config
 from boresight.errors import UserError
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.tracking.core import make_plan
@@ -60,3 +64,17 @@ def test_a_manoeuvre_is_rougher_than_quiet_motion() -> None:
     for q, q_manoeuvre in ((0.5, 0.5), (None, 0.05), (0.1, float("inf"))):
         with pytest.raises(UserError, match="q_manoeuvre must be finite and larger"):
             make_plan(TrackerConfig(q=q, q_manoeuvre=q_manoeuvre), (), 2)
+
+
+@pytest.mark.parametrize("key", sorted(set(SENSOR_KEYS) - {"association", "moves_tracks"}))
+def test_a_sensors_key_reaches_its_field_in_the_unit_of_its_name(key: str, tmp_path: Path) -> None:
+    path = tmp_path / "tracker.toml"
+    path.write_text(f'[[sensor]]\nid = "ir"\n{key} = 0.3\n', encoding="utf-8")
+    errors = read_tracker_config(path, ["ir"]).sensors["ir"]
+    unit = math.pi / 180.0 if key.endswith("_deg") else 1.0
+    assert getattr(errors, SENSOR_KEYS[key][0]) == pytest.approx(0.3 * unit)
+
+
+def test_every_field_of_a_sensor_has_one_key() -> None:
+    fields = sorted(field.name for field in dataclasses.fields(SensorErrors))
+    assert sorted(field for field, _ in SENSOR_KEYS.values()) == fields
