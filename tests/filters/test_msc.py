@@ -8,7 +8,7 @@ import pytest
 from boresight.errors import UserError
 from boresight.filters import ekf, stream
 from boresight.filters.msc import MscFilter, to_cartesian, to_msc, to_world
-from boresight.kernels.msc_stream import msc_from_world
+from boresight.kernels.msc import msc_from_world
 from boresight.models import Infrared, NearlyConstantVelocity, Radar, SensorPose
 
 MSC = MscFilter()

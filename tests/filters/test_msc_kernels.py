@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from boresight.kernels import msc
-from boresight.kernels.msc_stream import msc_from_world, world_from_msc
+from boresight.kernels.msc import msc_from_world, world_from_msc
 from boresight.models import NearlyConstantVelocity
 
 X = np.array([300.0, -700.0, 250.0, 30.0, 12.0, -7.0])

@@ -153,7 +153,9 @@ class InteractingModels:
         x, P, weights = np.empty((k, n)), np.empty((k, n, n)), np.empty((k, r))
         N, kept = int(self.sizes.max()), k if keep else 0
         X, PP = np.empty((kept, r, N)), np.empty((kept, r, N, N))
-        done = imm.imm_stream(
+        from boresight.kernels.imm_stream import imm_stream  # compiled when it is imported
+
+        done = imm_stream(
             self.motions[0].kernel, self._parameters(), self.sizes, self.labels, self.rates, reports.observe,
             state.weights, state.X, state.PP, state.t, reports.t, reports.z, reports.context, sensor, scale, memory,
             limit, n, x, P, weights, X, PP,

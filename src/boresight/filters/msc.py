@@ -17,8 +17,7 @@ from boresight.filters import ekf
 from boresight.filters.stream import Filtered, Reports, require_all
 from boresight.kernels.gaussian import joseph_update, sandwich
 from boresight.kernels.measurement import wrap
-from boresight.kernels.msc import inverse_jacobian, jacobian
-from boresight.kernels.msc_stream import EXACT, msc_from_world, msc_stream, world_from_msc
+from boresight.kernels.msc import EXACT, inverse_jacobian, jacobian, msc_from_world, world_from_msc
 from boresight.models import check
 from boresight.models.base import KernelSensor
 from boresight.models.motion.base import KernelMotion
@@ -163,6 +162,8 @@ class MscFilter:
             raise UserError(f"the observer needs one position and velocity a report: ({k}, 6), not {own.shape}")
         shapes = ((k, n), (k, n, n), (k, n), (k, n, n), (k, n, n), (k, 2))
         out = [np.zeros(shape) for shape in shapes]
+        from boresight.kernels.msc_stream import msc_stream  # compiled when it is imported
+
         done = msc_stream(
             motion.kernel, motion.parameters, reports.observe, state.y, state.Py, state.t, state.own, reports.t,
             reports.z, reports.context, own, EXACT, *out,

@@ -11,7 +11,7 @@ from boresight.errors import UserError
 from boresight.filters import ekf
 from boresight.filters.stream import Filtered, Reports, require_all
 from boresight.kernels.gaussian import joseph_update, sandwich
-from boresight.kernels.unscented import linearise, sigma_points, ukf_stream
+from boresight.kernels.unscented import linearise, sigma_points
 from boresight.models.motion.base import KernelMotion
 from boresight.models.protocols import MeasurementModel, MotionModel
 from boresight.types.sensor import FloatArray
@@ -68,6 +68,8 @@ class UnscentedKalman:
         k, n = len(reports.t), motion.state_dimension
         shapes = ((k, n), (k, n, n), (k, n), (k, n, n), (k, n, n), (k, 2))
         out = [np.zeros(shape) for shape in shapes]
+        from boresight.kernels.unscented_stream import ukf_stream  # compiled when it is imported
+
         done = ukf_stream(
             motion.kernel, motion.parameters, reports.observe, state.x, state.P, state.t, reports.t, reports.z,
             reports.context, self.scaling, *out,

@@ -16,6 +16,9 @@ from numba import njit
 from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
+# transition and noise: through Cartesian; shao2012 (26) and (27) as printed; the same with their mistakes put right
+EXACT, PRINTED, MENDED = 0, 1, 2
+
 
 @njit(**PART)
 def _triad(azimuth: float, elevation: float) -> FloatArray:
@@ -49,6 +52,24 @@ def msc_from_cartesian(x: FloatArray) -> FloatArray:
         y[at] = (E[row, 0] * x[3] + E[row, 1] * x[4] + E[row, 2] * x[5]) / r
     y[5] = 1.0 / r
     return y
+
+
+@njit(cache=True)
+def world_from_msc(y: FloatArray, own: FloatArray) -> FloatArray:
+    """Return the Cartesian world state of MSC `y` about an observer with position and velocity `own` (6,)."""
+    x = cartesian_from_msc(y)
+    for i in range(6):
+        x[i] += own[i]
+    return x
+
+
+@njit(cache=True)
+def msc_from_world(x: FloatArray, own: FloatArray) -> FloatArray:
+    """Return MSC of the world state `x` about an observer with position and velocity `own` (6,)."""
+    s = x.copy()
+    for i in range(6):
+        s[i] -= own[i]
+    return msc_from_cartesian(s)
 
 
 @njit(cache=True)

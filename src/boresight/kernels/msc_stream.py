@@ -11,37 +11,19 @@ from numba import njit, types
 from boresight.kernels.gaussian import joseph_update, sandwich
 from boresight.kernels.measurement import wrap
 from boresight.kernels.msc import (
-    cartesian_from_msc,
+    EXACT,
+    PRINTED,
     first_order_noise,
     first_order_transition,
     inverse_jacobian,
     jacobian,
-    msc_from_cartesian,
+    msc_from_world,
+    world_from_msc,
 )
 from boresight.kernels.options import PART
 from boresight.kernels.signatures import MATRIX, MOTION, OBSERVATION, STACK, VECTOR
 from boresight.kernels.write import write_matrix, write_vector
 from boresight.types.sensor import FloatArray
-
-EXACT, PRINTED, MENDED = 0, 1, 2
-
-
-@njit(cache=True)
-def world_from_msc(y: FloatArray, own: FloatArray) -> FloatArray:
-    """Return the Cartesian world state of MSC `y` about an observer with position and velocity `own` (6,)."""
-    x = cartesian_from_msc(y)
-    for i in range(6):
-        x[i] += own[i]
-    return x
-
-
-@njit(cache=True)
-def msc_from_world(x: FloatArray, own: FloatArray) -> FloatArray:
-    """Return MSC of the world state `x` about an observer with position and velocity `own` (6,)."""
-    s = x.copy()
-    for i in range(6):
-        s[i] -= own[i]
-    return msc_from_cartesian(s)
 
 
 @njit(**PART)

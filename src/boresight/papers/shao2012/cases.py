@@ -16,8 +16,8 @@ import numpy as np
 from boresight.bounds import trajectory_bound
 from boresight.filters.msc import KNOWN_RANGE, MscFilter, MscState
 from boresight.filters.stream import Reports
-from boresight.kernels.msc import cartesian_from_msc, inverse_jacobian
-from boresight.kernels.msc_stream import EXACT, msc_from_world, msc_stream
+from boresight.kernels.msc import EXACT, cartesian_from_msc, inverse_jacobian, msc_from_world
+from boresight.kernels.msc_stream import msc_stream
 from boresight.kernels.stream import ekf_stream
 from boresight.models import Infrared, NearlyConstantVelocity, Radar
 from boresight.papers.montecarlo import finite, nees, polar, rms, wrapped

@@ -11,10 +11,9 @@ import numpy as np
 from boresight.align.compression import combine, compress, compressed_variance
 from boresight.filters.stream import Reports
 from boresight.kernels import msc_stream, smoothing
-from boresight.kernels.msc import inverse_jacobian
-from boresight.kernels.msc_stream import EXACT, PRINTED, msc_from_world, world_from_msc
+from boresight.kernels.msc import EXACT, PRINTED, inverse_jacobian, msc_from_world, world_from_msc
 from boresight.kernels.stream import ekf_stream
-from boresight.kernels.unscented import ukf_stream
+from boresight.kernels.unscented_stream import ukf_stream
 from boresight.models import Infrared, Radar
 from boresight.papers.montecarlo import Estimates, nees, wrapped
 from boresight.papers.shao2012.alignment import aligned
