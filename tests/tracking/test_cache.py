@@ -25,7 +25,7 @@ from boresight.types import Scan, Sensor, SensorKind
 def test_the_second_process_runs_both_trackers() -> None:
     """In plain Python: what is compiled is not the matter here, that it is called is."""
     done = subprocess.run(
-        cache.warming(3, blobs=True), env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True
+        cache.warming(3, (0.0, 0.1)), env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True
     )
     assert (done.returncode, done.stderr) == (0, "")
 

@@ -26,16 +26,16 @@ def compiled() -> bool:
 
 
 @contextlib.contextmanager
-def compiling_beside(dimensions: int, blobs: bool = False) -> Iterator[bool]:
+def compiling_beside(dimensions: int, blob_shares: tuple[float, ...] = (0.0,)) -> Iterator[bool]:
     """Compile the tracker in a second process while the body runs, unless that is done; gives whether it is not.
 
-    With `blobs` both the plain kernel and the one that looks for second targets in a blob. Leaves when both processes
-    are through. Should the second process fail, the kernels are compiled when they are called.
+    The kernel that looks for second targets in a blob (a share above 0) is another than the plain one. Leaves when both
+    processes are through. Should the second process fail, the kernels are compiled when they are called.
     """
     if compiled():
         yield False
         return
-    command = warming(dimensions, blobs)
+    command = warming(dimensions, blob_shares)
     child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         yield True
@@ -45,6 +45,6 @@ def compiling_beside(dimensions: int, blobs: bool = False) -> Iterator[bool]:
         child.wait()
 
 
-def warming(dimensions: int, blobs: bool = False) -> list[str]:
+def warming(dimensions: int, blob_shares: tuple[float, ...] = (0.0,)) -> list[str]:
     """Return the command that does what `warm` does in a process of its own."""
-    return [sys.executable, "-c", f"from boresight.tracking.warm import warm; warm({dimensions}, {blobs})"]
+    return [sys.executable, "-c", f"from boresight.tracking.warm import warm; warm({dimensions}, {blob_shares})"]

@@ -11,15 +11,12 @@ from boresight.tracking.tracker import Tracker
 from boresight.types import Component, Scan, Sensor, SensorKind
 
 
-def warm(dimensions: int, blobs: bool = False) -> None:
-    """Do what `warm_tracker` does for a tracker of `dimensions` with default settings.
-
-    With `blobs` also for one that looks for second targets in a blob, whose kernel is another.
-    """
+def warm(dimensions: int, blob_shares: tuple[float, ...] = (0.0,)) -> None:
+    """Do what `warm_tracker` does for trackers of `dimensions` with default settings but for `blob_share`."""
     sigma = np.full(7, np.nan)
     sigma[[Component.RANGE, Component.AZIMUTH]] = 1.0, 0.01
     radar = Sensor("warm", SensorKind.RADAR, sigma=sigma)
-    for share in (0.0, 0.1) if blobs else (0.0,):
+    for share in blob_shares:
         warm_tracker(Tracker(TrackerConfig(blob_share=share), (radar,), dimensions))
 
 
