@@ -119,7 +119,7 @@ def agree(s: Study) -> None:
     }
     alone = json.loads(child.communicate()[0])
     for name, x in many.items():
-        np.testing.assert_allclose(x[0], alone[name], rtol=0, atol=1e-6, err_msg=name)
+        np.testing.assert_allclose(x[0], alone[name], rtol=1e-9, atol=1e-8, err_msg=name)
 
 
 def streams() -> str:
