@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from boresight.kernels.parts import WideCompiler
+
 Contenders = dict[str, tuple[Callable[[], Any], int]]  # name -> (call, how many units of work one call does)
 Row = dict[str, Any]
 
@@ -37,7 +39,7 @@ def rows_of(work: str, contenders: Contenders, rounds: int, unit: str, scale: fl
     return [row(work, name, value * scale, unit, value / ours) for name, value in found.items()]
 
 
-@njit(fastmath={"contract"}, cache=True)
+@njit(fastmath={"contract"}, cache=True, pipeline_class=WideCompiler)
 def fused(a: np.ndarray, times: int) -> None:
     """Multiply and add, nothing else: 128 numbers that stay in registers and the first-level cache."""
     for _ in range(times):

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numba import njit
+from numpy.typing import NDArray
 
+from boresight.kernels.arctan import WIDE, WIDE_PASS
 from boresight.kernels.options import LEAF
 
 MODULE = """
@@ -85,3 +87,23 @@ def test_parts_are_cached_for_other_kernels_of_other_processes(tmp_path: Path) -
     code = f"import sys; sys.path.insert(0, {str(tmp_path)!r})\nimport numpy as np, parted as m\nm.first(-np.ones(2))"
     failed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert "ValueError: negative" in failed.stderr
+
+
+def test_a_kernel_over_tiles_and_its_parts_may_use_the_widest_vectors() -> None:
+    @njit(**{**WIDE_PASS, "cache": False})
+    def part(a: NDArray[np.float64]) -> None:
+        for i in range(64):
+            a[i] = 2.0 * a[i] + 1.0
+
+    @njit(**{**WIDE, "cache": False})
+    def kernel(a: NDArray[np.float64]) -> float:
+        part(a)
+        return float(a[63])
+
+    a = np.arange(64.0)
+    assert kernel(a) == 127.0
+    np.testing.assert_array_equal(a, 2.0 * np.arange(64.0) + 1.0)
+    code = next(iter(kernel.inspect_llvm().values()))
+    assert code.count('"prefer-vector-width"="512"') >= 1
+    with pytest.raises(TypeError, match="part of a kernel"):
+        part(a)

@@ -12,11 +12,13 @@ from typing import Any
 
 from numba import njit
 
-from boresight.kernels.parts import PartCompiler
+from boresight.kernels.parts import PartCompiler, WideCompiler, WidePartCompiler
 
 FAST: dict[str, Any] = {"cache": True, "fastmath": {"contract"}, "error_model": "numpy"}
 PASS: dict[str, Any] = {**FAST, "pipeline_class": PartCompiler}  # called by kernels only
 INLINE: dict[str, Any] = {**PASS, "forceinline": True}
+WIDE: dict[str, Any] = {**FAST, "pipeline_class": WideCompiler}  # kernels over tiles, and
+WIDE_PASS: dict[str, Any] = {**FAST, "pipeline_class": WidePartCompiler}  # what these call
 
 _PI, _HALF_PI, _QUARTER_PI = 3.141592653589793, 1.5707963267948966, 0.7853981633974483
 _TAN_EIGHTH = 0.41421356237309503  # tan(π/8)

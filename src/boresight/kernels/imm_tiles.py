@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numba import njit, types
 
-from boresight.kernels.arctan import FAST, INLINE, PASS, exponential
+from boresight.kernels.arctan import FAST, INLINE, WIDE, WIDE_PASS, exponential
 from boresight.kernels.blocks import ROWS, Belief, Nine, Six, Three, load, store
 from boresight.kernels.observation import IntArray
 from boresight.kernels.signatures import MATRIX, STACK, VECTOR
@@ -54,7 +54,7 @@ def between(s: float, a: Belief, b: Belief) -> Belief:
     return position, velocity, of_position, cross, of_velocity
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def mix_tile(b: FloatArray, other: FloatArray, weight: FloatArray, stay: float, come: float) -> None:
     """Mix two tiles; `weight` (WIDTH,) of the first becomes its predicted one.
 
@@ -73,7 +73,7 @@ def mix_tile(b: FloatArray, other: FloatArray, weight: FloatArray, stay: float, 
         weight[l] = predicted
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def weigh_tile(b: FloatArray, other: FloatArray, weight: FloatArray) -> None:
     """Weigh the two models of every track by their likelihoods of the last report, N(y; 0, S)."""
     for l in range(WIDTH):
@@ -91,7 +91,7 @@ def weigh_tile(b: FloatArray, other: FloatArray, weight: FloatArray) -> None:
         MATRIX, types.float64, VECTOR, STACK, VECTOR, STACK, MATRIX, types.int64[::1], MATRIX,
     ),
     nogil=True,
-    **FAST,
+    **WIDE,
 )  # fmt: skip
 def run_imm_tiles(
     tiles: FloatArray,

@@ -19,7 +19,7 @@ import math
 
 from numba import njit, types
 
-from boresight.kernels.arctan import FAST, INLINE, PASS, arctan2, near
+from boresight.kernels.arctan import INLINE, WIDE, WIDE_PASS, arctan2, near
 from boresight.kernels.blocks import ROWS, Nine, Six, Three, condition, dot, load, move, store
 from boresight.kernels.observation import NOISE, IntArray
 from boresight.kernels.signatures import MATRIX, STACK, VECTOR
@@ -117,7 +117,7 @@ def msc_from_local(D: Three, G: Nine, r: float, A: Six, B: Nine, C: Six) -> Bloc
     )  # fmt: skip
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def move_msc_tile(b: FloatArray, dt: float, q: float, shift: Three, push: Three) -> None:
     """Move every track by `dt`; `shift` (m) and `push` (m/s) are what the observer's own acceleration does to it."""
     for l in range(WIDTH):
@@ -163,7 +163,7 @@ def move_msc_tile(b: FloatArray, dt: float, q: float, shift: Three, push: Three)
         b[DET * WIDTH + l] = 1.0
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def report_msc_tile(b: FloatArray, z: FloatArray, noise: Three, ranged: float) -> None:
     """Condition every track on range (if `ranged` is 1), azimuth and elevation: z (3·WIDTH,).
 
@@ -191,7 +191,7 @@ def report_msc_tile(b: FloatArray, z: FloatArray, noise: Three, ranged: float) -
         MATRIX, types.float64, types.float64, VECTOR, MATRIX, VECTOR, STACK, MATRIX, types.int64[::1], MATRIX,
     ),
     nogil=True,
-    **FAST,
+    **WIDE,
 )  # fmt: skip
 def run_msc_tiles(
     tiles: FloatArray,

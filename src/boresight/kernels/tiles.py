@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, types
 
-from boresight.kernels.arctan import FAST, PASS, near
+from boresight.kernels.arctan import WIDE, WIDE_PASS, near
 from boresight.kernels.blocks import ROWS, Nine, Three, condition, condition_rate, load, move, store
 from boresight.kernels.observation import NOISE, POSITION, ROTATION, VELOCITY, IntArray
 from boresight.kernels.sight import polar, range_rate, turned_polar
@@ -30,7 +30,7 @@ SEEN = (7 * SLOPE + 3) * WIDTH
 RATE_SLOPE = 7 * SLOPE
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def move_tile(b: FloatArray, dt: float, q: float) -> None:
     """Move every track, note its position before the report, and begin its NIS and determinant."""
     for l in range(WIDTH):
@@ -44,7 +44,7 @@ def move_tile(b: FloatArray, dt: float, q: float) -> None:
         b[DET * WIDTH + l] = 1.0
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def see_polar(b: FloatArray, seen: FloatArray, s0: float, s1: float, s2: float) -> None:
     """Fill rows of range, azimuth and elevation as seen from (s0, s1, s2) in north-aligned axes."""
     for l in range(WIDTH):
@@ -57,7 +57,7 @@ def see_polar(b: FloatArray, seen: FloatArray, s0: float, s1: float, s2: float) 
             seen[(2 * SLOPE + 1 + i) * WIDTH + l] = h_e[i]
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def see_turned(b: FloatArray, seen: FloatArray, s0: float, s1: float, s2: float, R: Nine) -> None:
     """As `see_polar` for a sensor whose axes are turned by R (enu_from_sensor by rows)."""
     for l in range(WIDTH):
@@ -70,7 +70,7 @@ def see_turned(b: FloatArray, seen: FloatArray, s0: float, s1: float, s2: float,
             seen[(2 * SLOPE + 1 + i) * WIDTH + l] = h_e[i]
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def see_rate(b: FloatArray, seen: FloatArray, s: Three, u: Three) -> None:
     """Fill the rows of range rate as seen from `s`, moving at `u`."""
     row = 3 * SLOPE
@@ -87,7 +87,7 @@ def see_rate(b: FloatArray, seen: FloatArray, s: Three, u: Three) -> None:
             seen[(RATE_SLOPE + i) * WIDTH + l] = g[i]
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def see_axis(b: FloatArray, component: FloatArray, s: Three, h: Three) -> None:
     """Fill one component's rows with the coordinate along `h` from `s`."""
     for l in range(WIDTH):
@@ -97,7 +97,7 @@ def see_axis(b: FloatArray, component: FloatArray, s: Three, h: Three) -> None:
             component[(1 + i) * WIDTH + l] = h[i]
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def condition_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r: float, turn: bool) -> None:
     """Condition every track on one component, `seen` (4·WIDTH,), measured as `z` (WIDTH,); `turn` for an angle."""
     for l in range(WIDTH):
@@ -113,7 +113,7 @@ def condition_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r: float, tur
         b[(SCORE + 1) * WIDTH + l] += 1.0 if y == y else 0.0
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def condition_angles_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r_a: float, r_e: float) -> None:
     """Condition on azimuth and elevation in one pass: `seen` (8·WIDTH,), `z` (2·WIDTH,); as two `condition_tile`."""
     for l in range(WIDTH):
@@ -130,7 +130,7 @@ def condition_angles_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r_a: f
         b[(SCORE + 1) * WIDTH + l] += (1.0 if y_a == y_a else 0.0) + (1.0 if y_e == y_e else 0.0)
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def condition_polar_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r: float, r_a: float, r_e: float) -> None:
     """Condition on range, azimuth and elevation in one pass: `seen` (12·WIDTH,), `z` (3·WIDTH,)."""
     for l in range(WIDTH):
@@ -152,7 +152,7 @@ def condition_polar_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r: floa
         b[(SCORE + 1) * WIDTH + l] += used
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def condition_rate_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r: float) -> None:
     """As `condition_tile` for range rate, `seen` (31·WIDTH,) being all components."""
     row = 3 * SLOPE
@@ -170,7 +170,7 @@ def condition_rate_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r: float
         b[(SCORE + 1) * WIDTH + l] += 1.0 if y == y else 0.0
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def see_tile(b: FloatArray, seen: FloatArray, c: FloatArray) -> None:
     """Fill the rows of every component that the sensor with context `c` (66,) measures."""
     s = (c[POSITION], c[POSITION + 1], c[POSITION + 2])
@@ -188,7 +188,7 @@ def see_tile(b: FloatArray, seen: FloatArray, c: FloatArray) -> None:
             see_axis(b, seen[rows : rows + SLOPE * WIDTH], s, (R[a], R[3 + a], R[6 + a]))
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def report_tile(b: FloatArray, seen: FloatArray, z: FloatArray, c: FloatArray) -> None:
     """Condition every track on its report: `z` (m·WIDTH,) the sensor's measured components in ascending order."""
     see_tile(b, seen, c)
@@ -211,7 +211,7 @@ def report_tile(b: FloatArray, seen: FloatArray, z: FloatArray, c: FloatArray) -
         i += 1
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def aligned(size: int) -> FloatArray:
     """Return an array (size,) that begins on a cache line: vectors across two lines cost a third of the speed."""
     raw = np.empty(size + 7)
@@ -224,7 +224,7 @@ def aligned(size: int) -> FloatArray:
         MATRIX, types.float64, types.float64, VECTOR, types.float64[:, :, ::1], MATRIX, types.int64[::1], MATRIX, STACK
     ),
     nogil=True,
-    **FAST,
+    **WIDE,
 )  # fmt: skip
 def run_tiles(
     tiles: FloatArray,

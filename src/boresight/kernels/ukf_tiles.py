@@ -14,7 +14,7 @@ import math
 
 from numba import njit, types
 
-from boresight.kernels.arctan import FAST, INLINE, PASS, near
+from boresight.kernels.arctan import INLINE, WIDE, WIDE_PASS, near
 from boresight.kernels.blocks import ROWS, Nine, Six, Three, condition, load, store
 from boresight.kernels.observation import NOISE, POSITION, ROTATION, IntArray
 from boresight.kernels.sight import into, polar
@@ -90,7 +90,7 @@ def less(h: Three, f: float, g: Three) -> Three:
     return h[0] - f * g[0], h[1] - f * g[1], h[2] - f * g[2]
 
 
-@njit(**PASS)
+@njit(**WIDE_PASS)
 def unscented_tile(
     b: FloatArray, z: FloatArray, position: Three, R: Nine, noise: Three, ranged: float, total: float, rest: float
 ) -> None:
@@ -135,7 +135,7 @@ def unscented_tile(
         MATRIX, types.float64, types.float64, VECTOR, VECTOR, STACK, MATRIX, types.int64[::1], MATRIX,
     ),
     nogil=True,
-    **FAST,
+    **WIDE,
 )  # fmt: skip
 def run_ukf_tiles(
     tiles: FloatArray,
