@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 from numba import njit
 
 from boresight.kernels.parts import PartCompiler, WideCompiler, WidePartCompiler
@@ -18,7 +19,7 @@ FAST: dict[str, Any] = {"cache": True, "fastmath": {"contract"}, "error_model": 
 PASS: dict[str, Any] = {**FAST, "pipeline_class": PartCompiler}  # called by kernels only
 INLINE: dict[str, Any] = {**PASS, "forceinline": True}
 WIDE: dict[str, Any] = {**FAST, "pipeline_class": WideCompiler}  # kernels over tiles, and
-WIDE_PASS: dict[str, Any] = {**FAST, "pipeline_class": WidePartCompiler}  # what these call
+WIDE_PASS: dict[str, Any] = {**FAST, "pipeline_class": WidePartCompiler, "_nrt": False}  # what these call
 
 _PI, _HALF_PI, _QUARTER_PI = 3.141592653589793, 1.5707963267948966, 0.7853981633974483
 _TAN_EIGHTH = 0.41421356237309503  # tan(π/8)
@@ -60,7 +61,7 @@ def arctan2(y: float, x: float) -> float:
 @njit(**INLINE)
 def near(angle: float) -> float:
     """Wrap an angle to [-π, π] (rad)."""
-    return angle - 2.0 * _PI * math.floor(angle * (0.5 / _PI) + 0.5)
+    return angle - 2.0 * _PI * np.floor(angle * (0.5 / _PI) + 0.5)
 
 
 @njit(**INLINE)

@@ -86,6 +86,49 @@ def weigh_tile(b: FloatArray, other: FloatArray, weight: FloatArray) -> None:
         weight[l] = first / (first + second)
 
 
+@njit(**WIDE_PASS)
+def run_imm_tile(
+    b: FloatArray,
+    other: FloatArray,
+    weight: FloatArray,
+    seen: FloatArray,
+    tile: FloatArray,
+    t0: float,
+    q: FloatArray,
+    transitions: FloatArray,
+    t: FloatArray,
+    z: FloatArray,
+    contexts: FloatArray,
+    sensor: IntArray,
+    score: FloatArray,
+) -> None:
+    """Filter the reports of one tile, see `run_imm_tiles`; the first four arrays are scratch."""
+    size = ROWS * WIDTH
+    write_vector(b, tile[:size])
+    write_vector(other, tile[size : 2 * size])
+    write_vector(weight, tile[2 * size :])
+    b[NIS * WIDTH :] = 0.0
+    other[NIS * WIDTH :] = 0.0
+    now = t0
+    for k in range(t.shape[0]):
+        dt = t[k] - now
+        if dt > 0.0:
+            mix_tile(b, other, weight, transitions[k, 0, 0], transitions[k, 1, 0])
+        now = t[k]
+        context = contexts[sensor[k]]
+        move_tile(b, dt, q[0])
+        report_tile(b, seen, z[k], context)
+        move_tile(other, dt, q[1])
+        report_tile(other, seen, z[k], context)
+        weigh_tile(b, other, weight)
+    write_vector(tile[:size], b[:size])
+    write_vector(tile[size : 2 * size], other[:size])
+    write_vector(tile[2 * size :], weight)
+    write_vector(score, b[SCORE * WIDTH :])
+    for l in range(WIDTH):
+        score[l] += b[NIS * WIDTH + l]
+
+
 @njit(
     types.void(
         MATRIX, types.float64, VECTOR, STACK, VECTOR, STACK, MATRIX, types.int64[::1], MATRIX,
@@ -116,31 +159,8 @@ def run_imm_tiles(
         room[2 * WORK : 2 * WORK + SEEN],
         room[2 * WORK + SEEN :],
     )
-    size = ROWS * WIDTH
     for i in range(tiles.shape[0]):
-        write_vector(b, tiles[i, :size])
-        write_vector(other, tiles[i, size : 2 * size])
-        write_vector(weight, tiles[i, 2 * size :])
-        b[NIS * WIDTH :] = 0.0
-        other[NIS * WIDTH :] = 0.0
-        now = t0
-        for k in range(t.shape[0]):
-            dt = t[k] - now
-            if dt > 0.0:
-                mix_tile(b, other, weight, transitions[k, 0, 0], transitions[k, 1, 0])
-            now = t[k]
-            context = contexts[sensor[k]]
-            move_tile(b, dt, q[0])
-            report_tile(b, seen, z[i, k], context)
-            move_tile(other, dt, q[1])
-            report_tile(other, seen, z[i, k], context)
-            weigh_tile(b, other, weight)
-        write_vector(tiles[i, :size], b[:size])
-        write_vector(tiles[i, size : 2 * size], other[:size])
-        write_vector(tiles[i, 2 * size :], weight)
-        write_vector(score[i], b[SCORE * WIDTH :])
-        for l in range(WIDTH):
-            score[i, l] += b[NIS * WIDTH + l]
+        run_imm_tile(b, other, weight, seen, tiles[i], t0, q, transitions, t, z[i], contexts, sensor, score[i])
 
 
 @njit(**FAST)

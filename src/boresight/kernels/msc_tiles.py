@@ -20,7 +20,7 @@ import math
 from numba import njit, types
 
 from boresight.kernels.arctan import INLINE, WIDE, WIDE_PASS, arctan2, near
-from boresight.kernels.blocks import ROWS, Nine, Six, Three, condition, dot, load, move, store
+from boresight.kernels.blocks import ROWS, Nine, Six, Three, condition_three, dot, load, move, store
 from boresight.kernels.observation import NOISE, IntArray
 from boresight.kernels.signatures import MATRIX, STACK, VECTOR
 from boresight.kernels.tiles import DET, NIS, SCORE, WIDTH, WORK, aligned
@@ -171,19 +171,53 @@ def report_msc_tile(b: FloatArray, z: FloatArray, noise: Three, ranged: float) -
     """
     for l in range(WIDTH):
         q, w, A, B, C = load(b, l, WIDTH)
-        here = q
-        r = 1.0 / q[2]
+        r, least = 1.0 / q[2], 0.1 * q[2]
         y0 = z[l] - r if ranged > 0.0 else math.nan
         y1, y2 = near(z[WIDTH + l] - q[0]), near(z[2 * WIDTH + l] - q[1])
-        q, w, A, B, C, nis_r, s_r = condition(q, w, A, B, C, here, (0.0, 0.0, -r * r), y0, noise[0])
-        q, w, A, B, C, nis_a, s_a = condition(q, w, A, B, C, here, (1.0, 0.0, 0.0), y1, noise[1])
-        q, w, A, B, C, nis_e, s_e = condition(q, w, A, B, C, here, (0.0, 1.0, 0.0), y2, noise[2])
-        q = (near(q[0]), q[1], max(q[2], 0.1 * here[2]))
+        h_r, h_a, h_e = (0.0, 0.0, -r * r), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+        q, w, A, B, C, nis, s = condition_three(q, w, A, B, C, h_r, y0, noise[0], h_a, y1, noise[1], h_e, y2, noise[2])
+        q = (near(q[0]), q[1], max(q[2], least))
         store(b, l, WIDTH, q, w, A, B, C)
-        b[NIS * WIDTH + l] += nis_r + nis_a + nis_e
-        b[DET * WIDTH + l] *= s_r * s_a * s_e
+        b[NIS * WIDTH + l] += nis
+        b[DET * WIDTH + l] *= s
         used = (1.0 if y0 == y0 else 0.0) + (1.0 if y1 == y1 else 0.0) + (1.0 if y2 == y2 else 0.0)
         b[(SCORE + 1) * WIDTH + l] += used
+
+
+@njit(**WIDE_PASS)
+def run_msc_tile(
+    b: FloatArray,
+    tile: FloatArray,
+    t0: float,
+    q: float,
+    own0: FloatArray,
+    own: FloatArray,
+    t: FloatArray,
+    z: FloatArray,
+    contexts: FloatArray,
+    sensor: IntArray,
+    score: FloatArray,
+) -> None:
+    """Filter the reports of one tile, see `run_msc_tiles`; `b` (WORK,) is scratch."""
+    write_vector(b, tile)
+    b[NIS * WIDTH :] = 0.0
+    now, before = t0, own0
+    for k in range(t.shape[0]):
+        dt, here = t[k] - now, own[k]
+        shift = (
+            before[0] + dt * before[3] - here[0],
+            before[1] + dt * before[4] - here[1],
+            before[2] + dt * before[5] - here[2],
+        )
+        move_msc_tile(b, dt, q, shift, (before[3] - here[3], before[4] - here[4], before[5] - here[5]))
+        now, before = t[k], here
+        c = contexts[sensor[k]]
+        noise = (c[NOISE], c[NOISE + 8], c[NOISE + 16])
+        report_msc_tile(b, z[k], noise, 1.0 if c[NOISE] > 0.0 else 0.0)
+    write_vector(tile, b[: ROWS * WIDTH])
+    write_vector(score, b[SCORE * WIDTH :])
+    for l in range(WIDTH):
+        score[l] += b[NIS * WIDTH + l]
 
 
 @njit(
@@ -208,22 +242,4 @@ def run_msc_tiles(
     """As `tiles.run_tiles`, beliefs in MSC about an observer at `own0` (6,) and `own` (k, 6); z (m, k, 3·WIDTH)."""
     b = aligned(WORK)
     for i in range(tiles.shape[0]):
-        write_vector(b, tiles[i])
-        b[NIS * WIDTH :] = 0.0
-        now, before = t0, own0
-        for k in range(t.shape[0]):
-            dt, here = t[k] - now, own[k]
-            shift = (
-                before[0] + dt * before[3] - here[0],
-                before[1] + dt * before[4] - here[1],
-                before[2] + dt * before[5] - here[2],
-            )
-            move_msc_tile(b, dt, q, shift, (before[3] - here[3], before[4] - here[4], before[5] - here[5]))
-            now, before = t[k], here
-            c = contexts[sensor[k]]
-            noise = (c[NOISE], c[NOISE + 8], c[NOISE + 16])
-            report_msc_tile(b, z[i, k], noise, 1.0 if c[NOISE] > 0.0 else 0.0)
-        write_vector(tiles[i], b[: ROWS * WIDTH])
-        write_vector(score[i], b[SCORE * WIDTH :])
-        for l in range(WIDTH):
-            score[i, l] += b[NIS * WIDTH + l]
+        run_msc_tile(b, tiles[i], t0, q, own0, own, t, z[i], contexts, sensor, score[i])

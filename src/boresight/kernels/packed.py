@@ -15,7 +15,18 @@ from typing import Any
 from numba import njit, types
 
 from boresight.kernels.arctan import FAST, INLINE, near
-from boresight.kernels.blocks import Nine, Six, Three, condition, condition_rate, load, move, store
+from boresight.kernels.blocks import (
+    Nine,
+    Six,
+    Three,
+    condition,
+    condition_rate,
+    condition_three,
+    condition_two,
+    load,
+    move,
+    store,
+)
 from boresight.kernels.observation import (
     CONTEXT_SIZE,
     DIMENSIONS,
@@ -59,18 +70,14 @@ def look(p: Three, v: Three, A: Six, B: Nine, C: Six, z: FloatArray, k: int, c: 
         r, azimuth, elevation, h_r, h_a, h_e = polar(d)
     else:
         r, azimuth, elevation, h_r, h_a, h_e = turned_polar(R, d)
-    if not math.isnan(z[k]):
-        p, v, A, B, C, nis, _ = condition(p, v, A, B, C, here, h_r, z[k] - r, c[n])
-        total += nis
-        used += 1 if r == r else 0
-    if not math.isnan(z[k + 1]):
-        p, v, A, B, C, nis, _ = condition(p, v, A, B, C, here, h_a, near(z[k + 1] - azimuth), c[n + 8])
-        total += nis
-        used += 1 if azimuth == azimuth else 0
-    if not math.isnan(z[k + 2]):
-        p, v, A, B, C, nis, _ = condition(p, v, A, B, C, here, h_e, near(z[k + 2] - elevation), c[n + 16])
-        total += nis
-        used += 1 if elevation == elevation else 0
+    y_r, y_a, y_e = z[k] - r, near(z[k + 1] - azimuth), near(z[k + 2] - elevation)
+    if y_r == y_r:
+        p, v, A, B, C, total, _ = condition_three(
+            p, v, A, B, C, h_r, y_r, c[n], h_a, y_a, c[n + 8], h_e, y_e, c[n + 16]
+        )
+    elif y_a == y_a or y_e == y_e:
+        p, v, A, B, C, total, _ = condition_two(p, v, A, B, C, h_a, y_a, c[n + 8], h_e, y_e, c[n + 16])
+    used += (1 if y_r == y_r else 0) + (1 if y_a == y_a else 0) + (1 if y_e == y_e else 0)
     if not math.isnan(z[k + 3]):
         u = (speed[0] - c[o + VELOCITY], speed[1] - c[o + VELOCITY + 1], speed[2] - c[o + VELOCITY + 2])
         rate, h, g = range_rate(d, u)

@@ -13,8 +13,20 @@ import numpy as np
 from numba import njit, types
 
 from boresight.kernels.arctan import WIDE, WIDE_PASS, near
-from boresight.kernels.blocks import ROWS, Nine, Three, condition, condition_rate, load, move, store
+from boresight.kernels.blocks import (
+    ROWS,
+    Nine,
+    Three,
+    condition,
+    condition_rate,
+    condition_three,
+    condition_two,
+    load,
+    move,
+    store,
+)
 from boresight.kernels.observation import NOISE, POSITION, ROTATION, VELOCITY, IntArray
+from boresight.kernels.options import COUNTED
 from boresight.kernels.sight import polar, range_rate, turned_polar
 from boresight.kernels.signatures import MATRIX, STACK, VECTOR
 from boresight.kernels.write import write_vector
@@ -115,39 +127,34 @@ def condition_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r: float, tur
 
 @njit(**WIDE_PASS)
 def condition_angles_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r_a: float, r_e: float) -> None:
-    """Condition on azimuth and elevation in one pass: `seen` (8·WIDTH,), `z` (2·WIDTH,); as two `condition_tile`."""
+    """Condition on azimuth and elevation, before anything else: `seen` (8·WIDTH,), `z` (2·WIDTH,)."""
     for l in range(WIDTH):
         p, v, A, B, C = load(b, l, WIDTH)
-        prior = (b[PRIOR * WIDTH + l], b[(PRIOR + 1) * WIDTH + l], b[(PRIOR + 2) * WIDTH + l])
         y_a, y_e = near(z[l] - seen[l]), near(z[WIDTH + l] - seen[SLOPE * WIDTH + l])
-        h = (seen[WIDTH + l], seen[2 * WIDTH + l], seen[3 * WIDTH + l])
-        p, v, A, B, C, nis_a, s_a = condition(p, v, A, B, C, prior, h, y_a, r_a)
-        h = (seen[5 * WIDTH + l], seen[6 * WIDTH + l], seen[7 * WIDTH + l])
-        p, v, A, B, C, nis_e, s_e = condition(p, v, A, B, C, prior, h, y_e, r_e)
+        h_a = (seen[WIDTH + l], seen[2 * WIDTH + l], seen[3 * WIDTH + l])
+        h_e = (seen[5 * WIDTH + l], seen[6 * WIDTH + l], seen[7 * WIDTH + l])
+        p, v, A, B, C, nis, s = condition_two(p, v, A, B, C, h_a, y_a, r_a, h_e, y_e, r_e)
         store(b, l, WIDTH, p, v, A, B, C)
-        b[NIS * WIDTH + l] += nis_a + nis_e
-        b[DET * WIDTH + l] *= s_a * s_e
+        b[NIS * WIDTH + l] += nis
+        b[DET * WIDTH + l] *= s
         b[(SCORE + 1) * WIDTH + l] += (1.0 if y_a == y_a else 0.0) + (1.0 if y_e == y_e else 0.0)
 
 
 @njit(**WIDE_PASS)
 def condition_polar_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r: float, r_a: float, r_e: float) -> None:
-    """Condition on range, azimuth and elevation in one pass: `seen` (12·WIDTH,), `z` (3·WIDTH,)."""
+    """Condition on range, azimuth and elevation, before anything else: `seen` (12·WIDTH,), `z` (3·WIDTH,)."""
     for l in range(WIDTH):
         p, v, A, B, C = load(b, l, WIDTH)
-        prior = (b[PRIOR * WIDTH + l], b[(PRIOR + 1) * WIDTH + l], b[(PRIOR + 2) * WIDTH + l])
         y = z[l] - seen[l]
         y_a = near(z[WIDTH + l] - seen[SLOPE * WIDTH + l])
         y_e = near(z[2 * WIDTH + l] - seen[2 * SLOPE * WIDTH + l])
         h = (seen[WIDTH + l], seen[2 * WIDTH + l], seen[3 * WIDTH + l])
-        p, v, A, B, C, nis, s = condition(p, v, A, B, C, prior, h, y, r)
-        h = (seen[5 * WIDTH + l], seen[6 * WIDTH + l], seen[7 * WIDTH + l])
-        p, v, A, B, C, nis_a, s_a = condition(p, v, A, B, C, prior, h, y_a, r_a)
-        h = (seen[9 * WIDTH + l], seen[10 * WIDTH + l], seen[11 * WIDTH + l])
-        p, v, A, B, C, nis_e, s_e = condition(p, v, A, B, C, prior, h, y_e, r_e)
+        h_a = (seen[5 * WIDTH + l], seen[6 * WIDTH + l], seen[7 * WIDTH + l])
+        h_e = (seen[9 * WIDTH + l], seen[10 * WIDTH + l], seen[11 * WIDTH + l])
+        p, v, A, B, C, nis, s = condition_three(p, v, A, B, C, h, y, r, h_a, y_a, r_a, h_e, y_e, r_e)
         store(b, l, WIDTH, p, v, A, B, C)
-        b[NIS * WIDTH + l] += nis + nis_a + nis_e
-        b[DET * WIDTH + l] *= s * s_a * s_e
+        b[NIS * WIDTH + l] += nis
+        b[DET * WIDTH + l] *= s
         used = (1.0 if y == y else 0.0) + (1.0 if y_a == y_a else 0.0) + (1.0 if y_e == y_e else 0.0)
         b[(SCORE + 1) * WIDTH + l] += used
 
@@ -211,12 +218,42 @@ def report_tile(b: FloatArray, seen: FloatArray, z: FloatArray, c: FloatArray) -
         i += 1
 
 
-@njit(**WIDE_PASS)
+@njit(**COUNTED)
 def aligned(size: int) -> FloatArray:
     """Return an array (size,) that begins on a cache line: vectors across two lines cost a third of the speed."""
     raw = np.empty(size + 7)
     skip = (-(raw.ctypes.data // 8)) % 8
     return raw[skip : skip + size]
+
+
+@njit(**WIDE_PASS)
+def run_tile(
+    work: FloatArray,
+    seen: FloatArray,
+    tile: FloatArray,
+    t0: float,
+    q: float,
+    t: FloatArray,
+    z: FloatArray,
+    contexts: FloatArray,
+    sensor: IntArray,
+    score: FloatArray,
+    kept: FloatArray,
+) -> None:
+    """Filter the reports of one tile (27·WIDTH,), see `run_tiles`; `work` (WORK,) and `seen` (SEEN,) are scratch."""
+    write_vector(work, tile)
+    work[NIS * WIDTH :] = 0.0
+    now = t0
+    for k in range(t.shape[0]):
+        move_tile(work, t[k] - now, q)
+        now = t[k]
+        report_tile(work, seen, z[k], contexts[sensor[k]])
+        if kept.shape[0] > 0:
+            write_vector(kept[0, k], work[: ROWS * WIDTH])
+    write_vector(tile, work[: ROWS * WIDTH])
+    write_vector(score, work[SCORE * WIDTH :])
+    for l in range(WIDTH):
+        score[l] += work[NIS * WIDTH + l]
 
 
 @njit(
@@ -246,16 +283,4 @@ def run_tiles(
     room = aligned(WORK + SEEN)
     work, seen = room[:WORK], room[WORK:]
     for i in range(tiles.shape[0]):
-        write_vector(work, tiles[i])
-        work[NIS * WIDTH :] = 0.0
-        now = t0
-        for k in range(t.shape[0]):
-            move_tile(work, t[k] - now, q)
-            now = t[k]
-            report_tile(work, seen, z[i, k], contexts[sensor[k]])
-            if kept.shape[0] > 0:
-                write_vector(kept[i, k], work[: ROWS * WIDTH])
-        write_vector(tiles[i], work[: ROWS * WIDTH])
-        write_vector(score[i], work[SCORE * WIDTH :])
-        for l in range(WIDTH):
-            score[i, l] += work[NIS * WIDTH + l]
+        run_tile(work, seen, tiles[i], t0, q, t, z[i], contexts, sensor, score[i], kept[i : i + 1])

@@ -15,7 +15,7 @@ import math
 from numba import njit, types
 
 from boresight.kernels.arctan import INLINE, WIDE, WIDE_PASS, near
-from boresight.kernels.blocks import ROWS, Nine, Six, Three, condition, load, store
+from boresight.kernels.blocks import ROWS, Nine, Six, Three, condition_three, less, load, store
 from boresight.kernels.observation import NOISE, POSITION, ROTATION, IntArray
 from boresight.kernels.sight import into, polar
 from boresight.kernels.signatures import MATRIX, STACK, VECTOR
@@ -84,12 +84,6 @@ def residual(Y: Points, a: int, b: int, ma: float, mb: float, ca: Three, cb: Thr
     return total - (ca[0] * cb[0] + ca[1] * cb[1] + ca[2] * cb[2])
 
 
-@njit(**INLINE)
-def less(h: Three, f: float, g: Three) -> Three:
-    """Return h - f·g."""
-    return h[0] - f * g[0], h[1] - f * g[1], h[2] - f * g[2]
-
-
 @njit(**WIDE_PASS)
 def unscented_tile(
     b: FloatArray, z: FloatArray, position: Three, R: Nine, noise: Three, ranged: float, total: float, rest: float
@@ -101,7 +95,6 @@ def unscented_tile(
     s, w = math.sqrt(total), 0.5 / total
     for l in range(WIDTH):
         p, v, A, B, C = load(b, l, WIDTH)
-        here = p
         L = factor(A)
         middle, Y = seven(R, (p[0] - position[0], p[1] - position[1], p[2] - position[2]), L, s)
         m0 = w * (Y[1][0] + Y[2][0] + Y[3][0] + Y[4][0] + Y[5][0] + Y[6][0])
@@ -113,9 +106,7 @@ def unscented_tile(
         r11 = noise[1] + residual(Y, 1, 1, m1, m1, c1, c1, w, rest)
         r22 = noise[2] + residual(Y, 2, 2, m2, m2, c2, c2, w, rest)
         f = residual(Y, 2, 1, m2, m1, c2, c1, w, rest) / r11
-        p, v, A, B, C, nis_a, s_a = condition(p, v, A, B, C, here, h1, y1, r11)
         g2, x2, d2 = less(h2, f, h1), y2 - f * y1, r22 - f * f * r11
-        p, v, A, B, C, nis_e, s_e = condition(p, v, A, B, C, here, g2, x2, d2)
         o1 = residual(Y, 0, 1, m0, m1, c0, c1, w, rest)
         e1 = o1 / r11
         e2 = (residual(Y, 0, 2, m0, m2, c0, c2, w, rest) - f * o1) / d2
@@ -123,11 +114,44 @@ def unscented_tile(
         y0 = z[l] - middle[0] - m0 - e1 * y1 - e2 * x2
         y0 = y0 if ranged > 0.0 else math.nan
         h0 = less(less(h0, e1, h1), e2, g2)
-        p, v, A, B, C, nis_r, s_r = condition(p, v, A, B, C, here, h0, y0, r00)
+        p, v, A, B, C, nis, det = condition_three(p, v, A, B, C, h1, y1, r11, g2, x2, d2, h0, y0, r00)
         store(b, l, WIDTH, p, v, A, B, C)
-        b[NIS * WIDTH + l] += nis_a + nis_e + nis_r
-        b[DET * WIDTH + l] *= s_a * s_e * s_r
+        b[NIS * WIDTH + l] += nis
+        b[DET * WIDTH + l] *= det
         b[(SCORE + 1) * WIDTH + l] += (2.0 + ranged) if y1 == y1 else 0.0
+
+
+@njit(**WIDE_PASS)
+def run_ukf_tile(
+    b: FloatArray,
+    tile: FloatArray,
+    t0: float,
+    q: float,
+    total: float,
+    rest: float,
+    t: FloatArray,
+    z: FloatArray,
+    contexts: FloatArray,
+    sensor: IntArray,
+    score: FloatArray,
+) -> None:
+    """Filter the reports of one tile, see `run_ukf_tiles` and `unscented_tile`; `b` (WORK,) is scratch."""
+    write_vector(b, tile)
+    b[NIS * WIDTH :] = 0.0
+    now = t0
+    for k in range(t.shape[0]):
+        move_tile(b, t[k] - now, q)
+        now = t[k]
+        c = contexts[sensor[k]]
+        e = ROTATION
+        R = (c[e], c[e + 1], c[e + 2], c[e + 3], c[e + 4], c[e + 5], c[e + 6], c[e + 7], c[e + 8])
+        position = (c[POSITION], c[POSITION + 1], c[POSITION + 2])
+        noise = (c[NOISE], c[NOISE + 8], c[NOISE + 16])
+        unscented_tile(b, z[k], position, R, noise, 1.0 if c[NOISE] > 0.0 else 0.0, total, rest)
+    write_vector(tile, b[: ROWS * WIDTH])
+    write_vector(score, b[SCORE * WIDTH :])
+    for l in range(WIDTH):
+        score[l] += b[NIS * WIDTH + l]
 
 
 @njit(
@@ -153,19 +177,4 @@ def run_ukf_tiles(
     total = scaling[0] ** 2 * (6.0 + scaling[2])
     rest = 1.0 - 6.0 / total + 1.0 - scaling[0] ** 2 + scaling[1] + 6.0 * 0.5 / total
     for i in range(tiles.shape[0]):
-        write_vector(b, tiles[i])
-        b[NIS * WIDTH :] = 0.0
-        now = t0
-        for k in range(t.shape[0]):
-            move_tile(b, t[k] - now, q)
-            now = t[k]
-            c = contexts[sensor[k]]
-            e = ROTATION
-            R = (c[e], c[e + 1], c[e + 2], c[e + 3], c[e + 4], c[e + 5], c[e + 6], c[e + 7], c[e + 8])
-            position = (c[POSITION], c[POSITION + 1], c[POSITION + 2])
-            noise = (c[NOISE], c[NOISE + 8], c[NOISE + 16])
-            unscented_tile(b, z[i, k], position, R, noise, 1.0 if c[NOISE] > 0.0 else 0.0, total, rest)
-        write_vector(tiles[i], b[: ROWS * WIDTH])
-        write_vector(score[i], b[SCORE * WIDTH :])
-        for l in range(WIDTH):
-            score[i, l] += b[NIS * WIDTH + l]
+        run_ukf_tile(b, tiles[i], t0, q, total, rest, t, z[i], contexts, sensor, score[i])
