@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.filters import MOTION, P0, SENSORS, X0
+from benchmarks.filters import MOTION, P0, SENSORS, X0, transition
 from benchmarks.timing import FUSED_TIMES, Contenders, Row, peak, row, timed
 from boresight.filters import ekf, packed, stream
 from boresight.filters.imm import InteractingModels
@@ -145,7 +145,7 @@ def numpy_batched(s: Study) -> np.ndarray:
     n = len(s.x0)
     x, P, now, eye = s.x0.copy(), np.broadcast_to(P0, (n, 6, 6)).copy(), 0.0, np.eye(6)
     for t, sensor, z in zip(s.t, s.sensors, s.z, strict=True):
-        F, Q = MOTION.F(X0, t - now), MOTION.Q(X0, t - now)
+        F, Q = transition(t - now)
         x, P, now = x @ F.T, F @ P @ F.T + Q, t
         e, north, u = x[:, 0], x[:, 1], x[:, 2]
         rho2 = e * e + north * north

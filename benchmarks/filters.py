@@ -157,15 +157,20 @@ def other_streams(reports: Rows) -> dict[str, Callable[[], object]]:
     }
 
 
+def transition(dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return F and Q of MOTION, by hand."""
+    F = np.eye(6)
+    F[:3, 3:] = dt * np.eye(3)
+    Q = np.block([[dt**3 / 3 * np.eye(3), dt**2 / 2 * np.eye(3)], [dt**2 / 2 * np.eye(3), dt * np.eye(3)]])
+    return F, MOTION.q * Q
+
+
 def by_hand(reports: Rows) -> np.ndarray:
     """Plain NumPy as one would write it: dense matrices, Jacobian by hand."""
     x, P, now = X0.copy(), P0.copy(), 0.0
     eye = np.eye(6)
     for t, sensor, z in reports:
-        dt = t - now
-        F = np.eye(6)
-        F[:3, 3:] = dt * np.eye(3)
-        Q = 0.5 * np.block([[dt**3 / 3 * np.eye(3), dt**2 / 2 * np.eye(3)], [dt**2 / 2 * np.eye(3), dt * np.eye(3)]])
+        F, Q = transition(t - now)
         x, P, now = F @ x, F @ P @ F.T + Q, t
         e, n, u = x[:3]
         rho2 = e * e + n * n
@@ -202,7 +207,7 @@ def filterpy(reports: Rows) -> np.ndarray:
         return d
 
     for t, sensor, z in reports:
-        peer.F, peer.Q = MOTION.F(X0, t - now), MOTION.Q(X0, t - now)
+        peer.F, peer.Q = transition(t - now)
         peer.predict()
         peer.dim_z = sensor.dimension
         peer.update(z, sensor.H, sensor.h, R=sensor.R(X0), residual=residual)

@@ -33,9 +33,8 @@ def output(code: str) -> tuple[float, float]:
 def rows(quick: bool) -> list[Row]:
     """Medians over fresh processes, the first of which fills the cache."""
     output(FIRST)
-    times = 3 if quick else 7
-    imports = statistics.median(output(IMPORT)[1] for _ in range(times))
-    firsts = [output(FIRST) for _ in range(times)]
+    imports = statistics.median(output(IMPORT)[1] for _ in range(3 if quick else 7))
+    firsts = [output(FIRST) for _ in range(1 if quick else 7)]
     return [
         row("import boresight", "boresight", imports, "s"),
         row("process start to first cached update", "boresight", statistics.median(f[0] for f in firsts), "s"),

@@ -89,6 +89,22 @@ def test_parts_are_cached_for_other_kernels_of_other_processes(tmp_path: Path) -
     assert "ValueError: negative" in failed.stderr
 
 
+def test_a_part_from_the_cache_is_not_machine_code(tmp_path: Path) -> None:
+    """It would be taken for the part of every kernel that is compiled later in the same process, and it is slow."""
+    (tmp_path / "parted.py").write_text(MODULE)
+    code = f"""
+import sys; sys.path.insert(0, {str(tmp_path)!r})
+import parted as m
+from numba import float64
+m.total.compile((float64[::1],))
+made = next(iter(m.total.overloads.values()))
+print(sum(m.total.stats.cache_hits.values()), made.library.get_pointer_to_function(made.fndesc.llvm_func_name))
+"""
+    for hits in ("0", "1"):
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+        assert done.stdout.split() == [hits, "0"], done.stderr
+
+
 def test_a_kernel_over_tiles_and_its_parts_may_use_the_widest_vectors() -> None:
     @njit(**{**WIDE_PASS, "cache": False})
     def part(a: NDArray[np.float64]) -> None:
@@ -100,10 +116,16 @@ def test_a_kernel_over_tiles_and_its_parts_may_use_the_widest_vectors() -> None:
         part(a)
         return float(a[63])
 
+    @njit(**{**WIDE, "cache": False})
+    def alone(a: NDArray[np.float64]) -> None:
+        for i in range(64):
+            a[i] = 2.0 * a[i] + 1.0
+
     a = np.arange(64.0)
     assert kernel(a) == 127.0
     np.testing.assert_array_equal(a, 2.0 * np.arange(64.0) + 1.0)
-    code = next(iter(kernel.inspect_llvm().values()))
-    assert code.count('"prefer-vector-width"="512"') >= 1
+    alone(a)
+    for f in (part, alone):  # `kernel` holds the code of `part`
+        assert '"prefer-vector-width"="512"' in next(iter(f.overloads.values())).library.get_llvm_str()
     with pytest.raises(TypeError, match="part of a kernel"):
         part(a)

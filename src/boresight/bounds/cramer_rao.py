@@ -6,7 +6,6 @@ import numpy as np
 
 from boresight.errors import UserError
 from boresight.filters.stream import Filtered, Reports, require_all, smooth
-from boresight.kernels.stream import bound_stream
 from boresight.models.motion.base import KernelMotion
 from boresight.types.sensor import FloatArray
 from boresight.types.state import GaussianState
@@ -22,6 +21,8 @@ def trajectory_bound(
     NaN matters, their values do not. `lag` 0 bounds filters, a positive lag (s) fixed-lag smoothers, None
     fixed-interval smoothers. Average over the runs of a Monte Carlo for its bound. Raises UserError as `stream.run`.
     """
+    from boresight.kernels.stream import bound_stream  # compiled when it is imported
+
     k, n = len(reports.t), motion.state_dimension
     if truth.shape != (k, n):
         raise UserError(f"the true path must have one state of length {n} per report: ({k}, {n}), not {truth.shape}")

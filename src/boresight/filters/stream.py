@@ -11,7 +11,6 @@ from boresight.errors import UserError
 from boresight.kernels import smoothing
 from boresight.kernels.observation import observe
 from boresight.kernels.packed import UNFIT, space_stream
-from boresight.kernels.stream import ekf_stream
 from boresight.models.base import KernelSensor
 from boresight.models.motion.base import KernelMotion
 from boresight.models.motion.cv import NearlyConstantVelocity
@@ -74,6 +73,8 @@ def run(state: GaussianState, motion: KernelMotion, reports: Reports, iterations
     if in_space and iterations == 1 and reports.observe is observe:
         done = space_stream(motion.q, state.x, state.P, state.t, *reports[:3], x, P, xp, Pp, F, nis)  # type: ignore[attr-defined]
     if done == UNFIT:
+        from boresight.kernels.stream import ekf_stream  # compiled when it is imported
+
         done = ekf_stream(
             motion.kernel, motion.parameters, reports.observe, state.x, state.P, state.t, *reports[:3], iterations,
             x, P, xp, Pp, F, nis,

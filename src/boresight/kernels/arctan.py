@@ -61,7 +61,8 @@ def arctan2(y: float, x: float) -> float:
 @njit(**INLINE)
 def near(angle: float) -> float:
     """Wrap an angle to [-π, π] (rad)."""
-    return angle - 2.0 * _PI * np.floor(angle * (0.5 / _PI) + 0.5)
+    turns: float = np.floor(angle * (0.5 / _PI) + 0.5)
+    return angle - 2.0 * _PI * turns
 
 
 @njit(**INLINE)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from llvmlite import binding as llvm
 from llvmlite import ir
 from numba._dynfunc import make_function
 from numba.core import cgutils
@@ -26,6 +27,8 @@ from numba.core.typed_passes import NativeLowering
 
 class PartLibrary(JITCodeLibrary):
     """Code to be put into others: never optimised in full, never machine code, cached as bitcode."""
+
+    refusal: ir.Module  # what Python calls
 
     def _optimize_final_module(self) -> None:
         made = self._codegen._module_pass_manager(
@@ -40,7 +43,14 @@ class PartLibrary(JITCodeLibrary):
         self._finalized = True
 
     def serialize_using_object_code(self) -> Any:
-        return self.serialize_using_bitcode()
+        """Return what the cache keeps: the code to be put into others, and machine code of the refusal alone.
+
+        A part that came from the cache as machine code would stand in for the same part in a kernel compiled after it:
+        one function of that name is enough for the linker, and it would be this one, never optimised.
+        """
+        self._ensure_finalized()
+        machine = self._codegen._tm.emit_object(llvm.parse_assembly(str(self.refusal)))
+        return self.name, "object", (machine, self._get_module_for_linking().as_bitcode())
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -56,7 +66,9 @@ class PartLowering(NativeLowering):
         flags.no_cpython_wrapper = flags.no_cfunc_wrapper = flags.no_compile = True
         super().run_pass(state)
         made, name = state["cr"], state.func_id.func_name
-        _refuse_python(context, library, made.fndesc.llvm_cpython_wrapper_name, name)
+        library.refusal = _refuse_python(context, library, made.fndesc.llvm_cpython_wrapper_name, name)
+        environment = ir.GlobalVariable(library.refusal, cgutils.voidptr_t, made.fndesc.env_name)
+        environment.linkage, environment.initializer = "common", cgutils.get_null_value(cgutils.voidptr_t)
         refusal = _refusal(context)
         entry = make_function(made.fndesc.lookup_module(), name, "part of a kernel", refusal, made.env, (library,))
         context.insert_user_function(entry, made.fndesc, [library])
@@ -115,8 +127,8 @@ class WideCompiler(PartCompiler):
     lowering = WideLowering
 
 
-def _refuse_python(context: Any, library: Any, wrapper: str, name: str) -> None:
-    """Give a library a wrapper for Python that does nothing but raise TypeError."""
+def _refuse_python(context: Any, library: Any, wrapper: str, name: str) -> ir.Module:
+    """Give a library a wrapper for Python that does nothing but raise TypeError; return its module."""
     module = context.create_module("refusal")
     obj = ir.IntType(8).as_pointer()
     function = ir.Function(module, ir.FunctionType(obj, [obj, obj, obj]), wrapper)
@@ -125,6 +137,7 @@ def _refuse_python(context: Any, library: Any, wrapper: str, name: str) -> None:
     context.get_python_api(builder).err_set_string("PyExc_TypeError", text)
     builder.ret(cgutils.get_null_value(obj))
     library.add_ir_module(module)
+    return module
 
 
 _refusals: dict[Any, tuple[Any, int]] = {}
