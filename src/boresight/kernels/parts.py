@@ -49,6 +49,11 @@ class PartLibrary(JITCodeLibrary):
         one function of that name is enough for the linker, and it would be this one, never optimised.
         """
         self._ensure_finalized()
+        for variable in self._final_module.global_variables:  # Numba sets these, of the part and of its own parts, anew
+            if variable.name.startswith("_ZN08NumbaEnv") and variable.name not in self.refusal.globals:
+                environment = ir.GlobalVariable(self.refusal, cgutils.voidptr_t, variable.name)
+                environment.linkage = "common"
+                environment.initializer = cgutils.get_null_value(cgutils.voidptr_t)
         machine = self._codegen._tm.emit_object(llvm.parse_assembly(str(self.refusal)))
         return self.name, "object", (machine, self._get_module_for_linking().as_bitcode())
 
@@ -67,8 +72,6 @@ class PartLowering(NativeLowering):
         super().run_pass(state)
         made, name = state["cr"], state.func_id.func_name
         library.refusal = _refuse_python(context, library, made.fndesc.llvm_cpython_wrapper_name, name)
-        environment = ir.GlobalVariable(library.refusal, cgutils.voidptr_t, made.fndesc.env_name)
-        environment.linkage, environment.initializer = "common", cgutils.get_null_value(cgutils.voidptr_t)
         refusal = _refusal(context)
         entry = make_function(made.fndesc.lookup_module(), name, "part of a kernel", refusal, made.env, (library,))
         context.insert_user_function(entry, made.fndesc, [library])
