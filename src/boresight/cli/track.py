@@ -133,10 +133,10 @@ def track_recording(
         from boresight.tracking.warm import warm_poses, warm_tracker
 
         tracker = tracker_for(recording, config, sensors)
+        before = make_pipeline(stages or {}, recording, tracker.poses, tracker.used, where)  # mistakes before compiling
         scans = list(iter_scans(recording, sensors))
         warm_poses(tracker, scans)
         warm_tracker(tracker)
-    before = make_pipeline(stages or {}, recording, tracker.poses, tracker.used, where)
     started = time.perf_counter()
     with _progress(len(scans)) as tick:
         smoothed: list[Rows] = []
