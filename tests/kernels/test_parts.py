@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numba import njit
+from numba.core import compiler
 from numpy.typing import NDArray
 
 from boresight.kernels.arctan import WIDE, WIDE_PASS
 from boresight.kernels.options import LEAF
+from boresight.kernels.parts import Flags
 
 MODULE = """
 import sys
@@ -107,6 +109,19 @@ print(sum(m.mean.stats.cache_hits.values()), made.library.get_pointer_to_functio
     for hits in ("0", "1"):
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
         assert done.stdout.split() == [hits, "0"], done.stderr
+
+
+def test_settings_compare_as_numba_compares_them() -> None:
+    plain, other = compiler.Flags(), compiler.Flags()
+    other.nrt = True
+    default = compiler.Flags()
+    default.nrt = False  # what it is anyway
+    for a in (plain, other, default):
+        for b in (plain, other, default):
+            assert (Flags(a) == b) is (b == Flags(a)) is (Flags(a) == Flags(b)) is (a == b)
+        assert hash(Flags(a)) == hash(a)
+    assert Flags(other).get_mangle_string() == other.get_mangle_string()
+    assert Flags(plain) != 1
 
 
 def test_a_kernel_over_tiles_and_its_parts_may_use_the_widest_vectors() -> None:
