@@ -159,8 +159,6 @@ def move_msc_tile(b: FloatArray, dt: float, q: float, shift: Three, push: Three)
         place = (arctan2(position[0], position[1]), arctan2(position[2], flat), b_new)
         store(b, l, WIDTH, place, rates, A, B, C)
         b[SCORE * WIDTH + l] += b[NIS * WIDTH + l]
-        b[NIS * WIDTH + l] = 0.0
-        b[DET * WIDTH + l] = 1.0
 
 
 @njit(**WIDE_PASS)
@@ -178,8 +176,8 @@ def report_msc_tile(b: FloatArray, z: FloatArray, noise: Three, ranged: float) -
         q, w, A, B, C, nis, s = condition_three(q, w, A, B, C, h_r, y0, noise[0], h_a, y1, noise[1], h_e, y2, noise[2])
         q = (near(q[0]), q[1], max(q[2], least))
         store(b, l, WIDTH, q, w, A, B, C)
-        b[NIS * WIDTH + l] += nis
-        b[DET * WIDTH + l] *= s
+        b[NIS * WIDTH + l] = nis
+        b[DET * WIDTH + l] = s
         used = (1.0 if y0 == y0 else 0.0) + (1.0 if y1 == y1 else 0.0) + (1.0 if y2 == y2 else 0.0)
         b[(SCORE + 1) * WIDTH + l] += used
 

@@ -44,14 +44,20 @@ RATE_SLOPE = 7 * SLOPE
 
 @njit(**WIDE_PASS)
 def move_tile(b: FloatArray, dt: float, q: float) -> None:
-    """Move every track, note its position before the report, and begin its NIS and determinant."""
+    """Move every track, and count the NIS of the report before."""
     for l in range(WIDTH):
         p, v, A, B, C = load(b, l, WIDTH)
         p, v, A, B, C = move(p, v, A, B, C, dt, q)
         store(b, l, WIDTH, p, v, A, B, C)
-        for i in range(3):
-            b[(PRIOR + i) * WIDTH + l] = p[i]
         b[SCORE * WIDTH + l] += b[NIS * WIDTH + l]
+
+
+@njit(**WIDE_PASS)
+def note_tile(b: FloatArray) -> None:
+    """Note every track's state before the report, and begin its NIS and determinant."""
+    for l in range(WIDTH):
+        for i in range(6):
+            b[(PRIOR + i) * WIDTH + l] = b[i * WIDTH + l]
         b[NIS * WIDTH + l] = 0.0
         b[DET * WIDTH + l] = 1.0
 
@@ -60,7 +66,7 @@ def move_tile(b: FloatArray, dt: float, q: float) -> None:
 def see_polar(b: FloatArray, seen: FloatArray, s0: float, s1: float, s2: float) -> None:
     """Fill rows of range, azimuth and elevation as seen from (s0, s1, s2) in north-aligned axes."""
     for l in range(WIDTH):
-        d = (b[PRIOR * WIDTH + l] - s0, b[(PRIOR + 1) * WIDTH + l] - s1, b[(PRIOR + 2) * WIDTH + l] - s2)
+        d = (b[l] - s0, b[WIDTH + l] - s1, b[2 * WIDTH + l] - s2)
         r, azimuth, elevation, h_r, h_a, h_e = polar(d)
         seen[l], seen[SLOPE * WIDTH + l], seen[2 * SLOPE * WIDTH + l] = r, azimuth, elevation
         for i in range(3):
@@ -73,7 +79,7 @@ def see_polar(b: FloatArray, seen: FloatArray, s0: float, s1: float, s2: float) 
 def see_turned(b: FloatArray, seen: FloatArray, s0: float, s1: float, s2: float, R: Nine) -> None:
     """As `see_polar` for a sensor whose axes are turned by R (enu_from_sensor by rows)."""
     for l in range(WIDTH):
-        d = (b[PRIOR * WIDTH + l] - s0, b[(PRIOR + 1) * WIDTH + l] - s1, b[(PRIOR + 2) * WIDTH + l] - s2)
+        d = (b[l] - s0, b[WIDTH + l] - s1, b[2 * WIDTH + l] - s2)
         r, azimuth, elevation, h_r, h_a, h_e = turned_polar(R, d)
         seen[l], seen[SLOPE * WIDTH + l], seen[2 * SLOPE * WIDTH + l] = r, azimuth, elevation
         for i in range(3):
@@ -87,10 +93,8 @@ def see_rate(b: FloatArray, seen: FloatArray, s: Three, u: Three) -> None:
     """Fill the rows of range rate as seen from `s`, moving at `u`."""
     row = 3 * SLOPE
     for l in range(WIDTH):
-        d = (b[PRIOR * WIDTH + l] - s[0], b[(PRIOR + 1) * WIDTH + l] - s[1], b[(PRIOR + 2) * WIDTH + l] - s[2])
-        v = (b[3 * WIDTH + l], b[4 * WIDTH + l], b[5 * WIDTH + l])  # nothing has been conditioned on yet
-        for i in range(3):
-            b[(PRIOR + 3 + i) * WIDTH + l] = v[i]
+        d = (b[l] - s[0], b[WIDTH + l] - s[1], b[2 * WIDTH + l] - s[2])
+        v = (b[3 * WIDTH + l], b[4 * WIDTH + l], b[5 * WIDTH + l])
         w = (v[0] - u[0], v[1] - u[1], v[2] - u[2])
         rate, h, g = range_rate(d, w)
         seen[row * WIDTH + l] = rate
@@ -103,7 +107,7 @@ def see_rate(b: FloatArray, seen: FloatArray, s: Three, u: Three) -> None:
 def see_axis(b: FloatArray, component: FloatArray, s: Three, h: Three) -> None:
     """Fill one component's rows with the coordinate along `h` from `s`."""
     for l in range(WIDTH):
-        d0, d1, d2 = b[PRIOR * WIDTH + l] - s[0], b[(PRIOR + 1) * WIDTH + l] - s[1], b[(PRIOR + 2) * WIDTH + l] - s[2]
+        d0, d1, d2 = b[l] - s[0], b[WIDTH + l] - s[1], b[2 * WIDTH + l] - s[2]
         component[l] = h[0] * d0 + h[1] * d1 + h[2] * d2
         for i in range(3):
             component[(1 + i) * WIDTH + l] = h[i]
@@ -135,8 +139,8 @@ def condition_angles_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r_a: f
         h_e = (seen[5 * WIDTH + l], seen[6 * WIDTH + l], seen[7 * WIDTH + l])
         p, v, A, B, C, nis, s = condition_two(p, v, A, B, C, h_a, y_a, r_a, h_e, y_e, r_e)
         store(b, l, WIDTH, p, v, A, B, C)
-        b[NIS * WIDTH + l] += nis
-        b[DET * WIDTH + l] *= s
+        b[NIS * WIDTH + l] = nis
+        b[DET * WIDTH + l] = s
         b[(SCORE + 1) * WIDTH + l] += (1.0 if y_a == y_a else 0.0) + (1.0 if y_e == y_e else 0.0)
 
 
@@ -153,8 +157,8 @@ def condition_polar_tile(b: FloatArray, seen: FloatArray, z: FloatArray, r: floa
         h_e = (seen[9 * WIDTH + l], seen[10 * WIDTH + l], seen[11 * WIDTH + l])
         p, v, A, B, C, nis, s = condition_three(p, v, A, B, C, h, y, r, h_a, y_a, r_a, h_e, y_e, r_e)
         store(b, l, WIDTH, p, v, A, B, C)
-        b[NIS * WIDTH + l] += nis
-        b[DET * WIDTH + l] *= s
+        b[NIS * WIDTH + l] = nis
+        b[DET * WIDTH + l] = s
         used = (1.0 if y == y else 0.0) + (1.0 if y_a == y_a else 0.0) + (1.0 if y_e == y_e else 0.0)
         b[(SCORE + 1) * WIDTH + l] += used
 
@@ -199,15 +203,19 @@ def see_tile(b: FloatArray, seen: FloatArray, c: FloatArray) -> None:
 def report_tile(b: FloatArray, seen: FloatArray, z: FloatArray, c: FloatArray) -> None:
     """Condition every track on its report: `z` (m·WIDTH,) the sensor's measured components in ascending order."""
     see_tile(b, seen, c)
+    angles = c[NOISE + 8] > 0.0 and c[NOISE + 16] > 0.0
+    others = c[NOISE + 24] > 0.0 or c[NOISE + 32] > 0.0 or c[NOISE + 40] > 0.0 or c[NOISE + 48] > 0.0
+    if others or not angles:  # what is taken later, or alone, needs it
+        note_tile(b)
     row, i = 0, 0
     while i < 7:
         r = c[NOISE + 8 * i]
         if r > 0.0:
             part, rows = z[row * WIDTH :], seen[SLOPE * i * WIDTH :]
-            if i == 0 and c[NOISE + 8] > 0.0 and c[NOISE + 16] > 0.0:
+            if i == 0 and angles:
                 condition_polar_tile(b, rows, part, r, c[NOISE + 8], c[NOISE + 16])
                 row, i = row + 2, 2
-            elif i == 1 and c[NOISE + 16] > 0.0:
+            elif i == 1 and angles:
                 condition_angles_tile(b, rows, part, r, c[NOISE + 16])
                 row, i = row + 1, 2
             elif i == 3:

@@ -116,8 +116,8 @@ def unscented_tile(
         h0 = less(less(h0, e1, h1), e2, g2)
         p, v, A, B, C, nis, det = condition_three(p, v, A, B, C, h1, y1, r11, g2, x2, d2, h0, y0, r00)
         store(b, l, WIDTH, p, v, A, B, C)
-        b[NIS * WIDTH + l] += nis
-        b[DET * WIDTH + l] *= det
+        b[NIS * WIDTH + l] = nis
+        b[DET * WIDTH + l] = det
         b[(SCORE + 1) * WIDTH + l] += (2.0 + ranged) if y1 == y1 else 0.0
 
 
