@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -129,31 +130,49 @@ def test_one_report_at_a_time_equals_the_stream_and_the_friendly_filter() -> Non
     np.testing.assert_allclose(packed.unpack(belief).P, state.P, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_tiles_equal_the_stream(threads: int) -> None:
-    """100 tracks: one full tile and a part; some reports missed by some tracks."""
-    rng, n, k = np.random.default_rng(4), 100, 60
-    t, sensors = np.cumsum(rng.uniform(0.0, 0.2, k)), [SENSORS[i % 5] for i in range(k)]
+def compare_tiles(sensors: tuple[KernelSensor, ...], count: int, tracks: tuple[int, ...], threads: int) -> None:
+    """100 tracks, one full tile and a part, some reports and some components missed by some, against the stream."""
+    rng, n, k = np.random.default_rng(4), 100, count
+    t, used = np.cumsum(rng.uniform(0.0, 0.2, k)), [sensors[i % len(sensors)] for i in range(k)]
     x0 = X0 + rng.normal(size=(n, 6)) * np.sqrt(np.diag(P0))
     z = []
-    for now, sensor in zip(t, sensors):
+    for now, sensor in zip(t, used):
         truth = X0.copy()
         truth[:3] += now * X0[3:]
         noise = rng.normal(size=(n, sensor.dimension)) * np.sqrt(np.diag(sensor.R(truth)))
         z.append(sensor.h(truth) + noise)
         z[-1][rng.random(n) < 0.2] = np.nan
         z[-1][rng.random(n) < 0.1, 0] = np.nan
-    many = packed.run_many(MOTION, 0.0, x0, P0, t, sensors, z, keep=True, threads=threads)
-    for i in (0, 1, 63, 64, 99):
+    many = packed.run_many(MOTION, 0.0, x0, P0, t, used, z, keep=True, threads=threads)
+    for i in tracks:
         belief, nis = packed.pack(ekf.init(0.0, x0[i], P0), MOTION), np.empty(k)
         kept = np.empty((k, 27))
-        packed.run(belief, packed.table(t, sensors, [row[i] for row in z]), kept, nis)
+        packed.run(belief, packed.table(t, used, [row[i] for row in z]), kept, nis)
         one = packed.unpack(belief)
         np.testing.assert_allclose(many.x[i], one.x, rtol=1e-11, atol=1e-9)
         np.testing.assert_allclose(many.P[i], one.P, rtol=1e-10, atol=1e-9)
         np.testing.assert_allclose(many.kept[:, i], kept[:, :6], rtol=1e-10, atol=1e-9)
         assert many.nis[i] == pytest.approx(nis.sum(), rel=1e-9)
         assert many.dof[i] == sum(int(np.isfinite(row[i]).sum()) for row in z)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_tiles_equal_the_stream(threads: int) -> None:
+    compare_tiles(SENSORS, 60, (0, 1, 63, 64, 99), threads)
+
+
+MIXED = tuple(
+    Radar(*(sigma if measured else None for sigma, measured in zip((5.0, 0.01, 0.02, 0.5), which)), pose=pose)
+    for pose in (SENSORS[0].pose, TURN)
+    for which in itertools.product((True, False), repeat=4)
+    if any(which)
+)
+
+
+@pytest.mark.parametrize("sensor", [*MIXED, None])
+def test_tiles_take_every_mix_of_components(sensor: Radar | None) -> None:
+    """Each mix alone, so that nothing that another left behind can stand in for what it should have noted; and all."""
+    compare_tiles((sensor,) if sensor else MIXED, 12 if sensor else 3 * len(MIXED), (0, 77), 1)
 
 
 def test_directions_that_are_not_defined_are_left_out() -> None:
