@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from boresight.kernels.tracker_window import advance
 from boresight.tracking import cache
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.tracker import Tracker
-from boresight.tracking.warm import warm_poses, warm_tracker
+from boresight.tracking.warm import warm, warm_poses, warm_tracker
 from boresight.types import Scan, Sensor, SensorKind
 
 
@@ -44,6 +45,31 @@ def test_waits_for_the_second_process_unless_the_body_fails(monkeypatch: pytest.
         raise KeyboardInterrupt
     time.sleep(1.0)
     assert not said.exists()  # it was stopped
+
+
+def test_garbage_is_looked_for_seldom_while_something_compiles_and_then_as_before(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = gc.get_threshold()
+    monkeypatch.setattr(cache, "compiled", lambda: False)
+    monkeypatch.setattr(cache, "warming", lambda *_: [sys.executable, "-c", ""])
+    monkeypatch.setattr(Tracker, "tick", lambda *_: found.append(gc.get_threshold()[0]))
+    found: list[int] = []
+    with cache.compiling_beside(3):
+        found.append(gc.get_threshold()[0])
+    with loading():
+        found.append(gc.get_threshold()[0])
+    warm(3)
+    with pytest.raises(KeyboardInterrupt), cache.seldom_collected():
+        raise KeyboardInterrupt
+    assert found == [200_000] * 3
+    assert gc.get_threshold() == before
+    try:
+        gc.set_threshold(0)  # never: as it was asked for
+        with cache.seldom_collected():
+            assert gc.get_threshold()[0] == 0
+    finally:
+        gc.set_threshold(*before)
 
 
 @pytest.mark.parametrize(

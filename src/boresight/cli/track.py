@@ -210,7 +210,7 @@ def versions() -> dict[str, str]:
 @contextlib.contextmanager
 def loading() -> Iterator[None]:
     """Say that kernels are loaded, and that the first run compiles them, while that goes on."""
-    from boresight.tracking.cache import compiled
+    from boresight.tracking.cache import compiled, seldom_collected
 
     said = threading.Event()
 
@@ -225,7 +225,8 @@ def loading() -> Iterator[None]:
     else:
         say()
     try:
-        yield
+        with seldom_collected():
+            yield
     finally:
         late.cancel()
     if said.is_set():

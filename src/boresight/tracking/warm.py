@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from boresight.tracking.cache import seldom_collected
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.tracker import Tracker
 from boresight.types import Component, Scan, Sensor, SensorKind
@@ -16,8 +17,9 @@ def warm(dimensions: int, blob_shares: tuple[float, ...] = (0.0,)) -> None:
     sigma = np.full(7, np.nan)
     sigma[[Component.RANGE, Component.AZIMUTH]] = 1.0, 0.01
     radar = Sensor("warm", SensorKind.RADAR, sigma=sigma)
-    for share in blob_shares:
-        warm_tracker(Tracker(TrackerConfig(blob_share=share), (radar,), dimensions))
+    with seldom_collected():
+        for share in blob_shares:
+            warm_tracker(Tracker(TrackerConfig(blob_share=share), (radar,), dimensions))
 
 
 def warm_tracker(tracker: Tracker) -> None:
