@@ -83,7 +83,7 @@ def scan_step(
             continue
         k = col_of_row[i]
         shy = s.lonely_bearings and not sensor.ranging and not sensor.joint and tr.heard[i] > 0
-        if shy and start[i + 1] > start[i] and (start[i + 1] - start[i] > 1 or claims[column[start[i]]] > 1):
+        if shy and contested(start[i], start[i + 1], column, claims, credible(tr, i)):
             if k >= 0:  # ambiguous: neither evidence nor update
                 row_of_col[k] = -1
                 fate[k] = UNASSOCIATED
@@ -138,12 +138,24 @@ def screen(
 
 
 @njit(**LEAF)
+def credible(tr: Tracks, i: int) -> bool:
+    """Whether track `i` has a say in whose a detection is."""
+    return bool(tr.life[i, 2] > 0.0 or 1.0 - tr.weight[i, NOTHING] > 0.5)
+
+
+@njit(**LEAF)
 def count_claims(tr: Tracks, start: IntArray, column: IntArray, claims: IntArray) -> None:
     """Add to `claims` (m,) how many credible tracks could claim each detection."""
     for i in range(len(start) - 1):
-        if tr.life[i, 2] > 0.0 or 1.0 - tr.weight[i, NOTHING] > 0.5:
+        if credible(tr, i):
             for e in range(start[i], start[i + 1]):
                 claims[column[e]] += 1
+
+
+@njit(**LEAF)
+def contested(first: int, end: int, column: IntArray, claims: IntArray, own: bool) -> bool:
+    """Whether a track has several detections in its gate (edges `first` to `end`), or one that another could claim."""
+    return end - first > 1 or (end > first and claims[column[first]] > int(own))
 
 
 @njit(**LEAF)
