@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from boresight.frames.pose import pose_track
-from boresight.kernels.tracker import AZIMUTH_BINS, NOTHING, STATIC, VISIBLE
+from boresight.kernels.tracker import AZIMUTH_BINS, HIDDEN, NOTHING, STATIC, VISIBLE
 from boresight.kernels.tracker_end import end_and_merge
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.tracking.tracker import Tracker, TrackerState
@@ -169,6 +169,18 @@ def test_a_bearing_that_two_tracks_could_claim_is_nobodys(lonely: bool, fate: Fa
     assert ((odds(state, 0), odds(state, 1)) == before) == lonely
 
 
+def test_a_track_that_hardly_exists_keeps_off_the_bearings_of_one_that_does() -> None:
+    """The bearing counts for the one, as if the other were not there, and says nothing about the other."""
+    used = tracker()
+    state = doubted(after(used, [[300.0, 400.0], [600.0, 800.0]]))
+    tr = state.window.tracks
+    tr.weight[1], tr.life[1, 2] = (0.1, 0.0, 0.0, 0.9), 0.0
+    before = odds(state, 0), odds(state, 1)
+    state, _ = used.step(state, glance(10.0, [np.arctan2(3.0, 4.0)]))
+    assert odds(state, 0) > 2.0 * before[0]
+    assert odds(state, 1) == before[1]
+
+
 @pytest.mark.parametrize(("apart", "shown"), [(0.0, 2), (60.0, 1)])
 def test_nothing_comes_up_beside_a_shown_track(apart: float, shown: int) -> None:
     state = after(tracker(apart=apart, merge_distance=1.0), [[300.0, 400.0], [340.0, 400.0]], looks=12)
@@ -224,6 +236,51 @@ def test_a_target_that_moved_may_stop_where_it_is() -> None:
     assert w[STATIC] == pytest.approx(0.05 * (w[VISIBLE] + w[STATIC]))
     np.testing.assert_array_equal(tr.anchor[0, :2], tr.x[0, :2])
     np.testing.assert_array_equal(tr.anchor_P[0, :2, :2], tr.P[0, :2, :2])
+
+
+@pytest.mark.parametrize("models", [{}, {"q_manoeuvre": 1.0}])
+def test_what_stood_may_set_off_from_where_it_is(models: dict[str, float]) -> None:
+    used = tracker(stop_floor=0.05, start_speed=1.5, **models)
+    state = after(used, [[300.0, 400.0]])
+    tr = state.window.tracks
+    tr.weight[0], tr.x[0, 2:4] = (1e-4, 1e-4, 0.9, 0.0998), 7.0
+    state, _ = used.step(state, points(10.0, [[302.0, 401.0]], first=900))
+    w = tr.weight[0]
+    target = w[VISIBLE] + w[HIDDEN]
+    assert target / (target + w[STATIC]) == pytest.approx(0.05, rel=1e-3)
+    assert w.sum() == pytest.approx(1.0)
+    np.testing.assert_array_equal(tr.x[0, :4], [*tr.anchor[0, :2], 0.0, 0.0])
+    np.testing.assert_array_equal(tr.P[0, :2, :2], tr.anchor_P[0, :2, :2])
+    np.testing.assert_array_equal(tr.P[0, 2:4, :4], [[0.0, 0.0, 2.25, 0.0], [0.0, 0.0, 0.0, 2.25]])
+    if models:
+        for mode in range(2):
+            np.testing.assert_array_equal(tr.mode_x[0, mode], tr.x[0])
+            np.testing.assert_array_equal(tr.mode_P[0, mode], tr.P[0])
+
+
+def test_a_boat_that_casts_off_is_shown_sooner_and_a_buoy_never() -> None:
+    """Ten boats that lie for two minutes and then go at 2 m/s, ten buoys; fixes good to 3 m every two seconds."""
+    shown_at: dict[float, list[float]] = {}
+    for speed in (0.0, 1.0):
+        used = tracker(static_share=0.3, stop_floor=0.004, start_speed=speed, confirm_above=0.985, merge_distance=1.0)
+        rng = np.random.default_rng(5)
+        home = np.array([[100.0 * k - 450.0, 500.0 + 150.0 * row] for row in range(2) for k in range(10)])
+        state, first = used.init(), np.full(20, np.inf)
+        for look in range(90):
+            t = 2.0 * look
+            away = np.zeros((20, 2))
+            away[:10, 1] = -2.0 * max(t - 120.0, 0.0)
+            where = home + away
+            state, _ = used.step(state, points(t, (where + rng.normal(0.0, 3.0, (20, 2))).tolist(), first=100 * look))
+            tr = state.window.tracks
+            for i in range(tr.live[0]):
+                if tr.life[i, 2] > 0.0:
+                    k = int(np.argmin(np.hypot(*(where - tr.x[i, :2]).T)))
+                    first[k] = min(first[k], t)
+        assert np.isinf(first[10:]).all()
+        assert (first[:10] > 120.0).all()
+        shown_at[speed] = list(first[:10] - 120.0)
+    assert np.median(shown_at[1.0]) < np.median(shown_at[0.0]) - 2.0
 
 
 def test_what_does_not_move_may_still_wander() -> None:

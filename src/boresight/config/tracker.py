@@ -28,6 +28,7 @@ TRACKER_KEYS = {
     "static_share": ("static_share", 1.0),
     "static_wander_m2_s": ("static_q", 1.0),
     "stop_floor": ("stop_floor", 1.0),
+    "start_speed_m_s": ("start_speed", 1.0),
     "targets_at_start": ("targets_at_start", 1.0),
     "apart_m": ("apart", 1.0),
     "doubt": ("doubt", 1.0),
@@ -80,6 +81,7 @@ class TrackerTable(TableModel, frozen=True):
     static_share: float | None = None
     static_wander_m2_s: float | None = None
     stop_floor: float | None = None
+    start_speed_m_s: float | None = None
     targets_at_start: float | None = None
     apart_m: float | None = None
     doubt: float | None = None

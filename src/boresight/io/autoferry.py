@@ -85,6 +85,7 @@ survival_time_s = 300.0
 static_share = 0.3
 static_wander_m2_s = 0.1
 stop_floor = 0.004
+start_speed_m_s = 1.0
 doubt = 0.025
 confirm_above = 0.985
 hide_below = 0.4

@@ -104,6 +104,7 @@ class Settings(NamedTuple):
     static_share: float  # of a new track's existence
     static_q: float  # m²/s
     stop_floor: float  # least weight of "it does not move": a target may stop
+    start_speed: float  # m/s, of what stood and sets off; 0: nothing does
     targets_at_start: float  # expected number of targets before the first look
     doubt: float  # least existence with which a track competes for detections
     delete_below: float

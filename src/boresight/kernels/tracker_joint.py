@@ -86,7 +86,7 @@ def take_shares(
         mix(tr, i, s, sensor, look, room, start, column, share, visible, models)
     weigh(tr, i, math.log(visible), math.log(still), temper)
     if own >= 0:
-        note_hit(tr, i, s, sensor, look.t + look.dt[own], moves)
+        note_hit(tr, i, s, sensor, look.t + look.dt[own], moves, models)
 
 
 @njit(**PART)

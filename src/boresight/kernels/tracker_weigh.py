@@ -140,6 +140,31 @@ def allow_stop(tr: Tracks, i: int, s: Settings) -> None:
 
 
 @njit(**LEAF)
+def allow_start(tr: Tracks, i: int, s: Settings, models: Models | None) -> None:
+    """Let an object that stood still set off from where it is now, at a speed that nobody knows yet."""
+    w = tr.weight[i]
+    target = w[VISIBLE] + w[HIDDEN]
+    if target < s.stop_floor * w[STATIC]:
+        w[VISIBLE] += s.stop_floor * w[STATIC] - target
+        w[STATIC] -= s.stop_floor * w[STATIC] - target
+        x, P, d = tr.x[i], tr.P[i], s.d
+        for a in range(2 * d):
+            for b in range(len(x)):
+                P[a, b] = P[b, a] = 0.0
+        for a in range(d):
+            x[a], x[d + a] = tr.anchor[i, a], 0.0
+            P[d + a, d + a] = s.start_speed**2
+            for b in range(d):
+                P[a, b] = tr.anchor_P[i, a, b]
+        if models is not None:
+            for j in range(2):
+                for a in range(len(x)):
+                    tr.mode_x[i, j, a] = x[a]
+                    for b in range(len(x)):
+                        tr.mode_P[i, j, a, b] = P[a, b]
+
+
+@njit(**LEAF)
 def static_likelihood(tr: Tracks, i: int, s: Settings, fix: FloatArray, fix_R: FloatArray, room: Workroom) -> float:
     """Log-likelihood of a position fix (world ENU) under "it does not move", on which the anchor is conditioned."""
     d = s.d
@@ -246,14 +271,18 @@ def take(
         else:
             condition_models(tr, i, s, k, look, sensor, room, considered)
     weigh(tr, i, log_visible, log_static, temper)
-    note_hit(tr, i, s, sensor, look.t + look.dt[k], sensor.moves_tracks)
+    note_hit(tr, i, s, sensor, look.t + look.dt[k], sensor.moves_tracks, models)
 
 
 @njit(**LEAF)
-def note_hit(tr: Tracks, i: int, s: Settings, sensor: SensorTable, t: float, moved: bool) -> None:
+def note_hit(
+    tr: Tracks, i: int, s: Settings, sensor: SensorTable, t: float, moved: bool, models: Models | None
+) -> None:
     """Remember that track `i` was detected at time `t` (s), and whether that moved it."""
     if sensor.ranging:
         allow_stop(tr, i, s)
+        if s.start_speed > 0.0 and tr.heard[i] > 0:
+            allow_start(tr, i, s, models)
     if moved:
         tr.heard[i] |= 1 << (sensor.number % 62)
     tr.life[i, 1] = t

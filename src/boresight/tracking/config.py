@@ -15,7 +15,7 @@ TIMES = ("manoeuvre_every", "manoeuvre_lasts")
 SHARES = ("static_share", "stop_floor", "doubt", "delete_below", "blob_share")
 NOT_NEGATIVE = (
     "q", "birth_rate", "static_q", "targets_at_start", "apart", "merge_distance", "coast_after", "smoothing_lag",
-    "window",
+    "window", "start_speed",
 )  # fmt: skip
 SPREADS = (  # of a sensor
     "bias_range", "bias_azimuth", "bias_elevation", "bias_position", "offset_time", "offset_range", "offset_scale",
@@ -71,7 +71,8 @@ class TrackerConfig:
     show_time: float = 10.0  # s, mean time for which it stays hidden
     static_share: float = 0.3  # of new objects do not move (and are not reported)
     static_q: float = 0.5  # m²/s, how an object that does not move may still wander
-    stop_floor: float = 0.02  # least weight of "it stands still", beside that of a moving target
+    stop_floor: float = 0.02  # least weight of "it stands still" beside that of a moving target, and vice versa
+    start_speed: float = 0.0  # m/s: what stood still may set off at about this speed, per axis (0: it may not)
     targets_at_start: float = 5.0  # expected number of targets before the first look
     apart: float = 0.0  # m: a track nearer than this to a shown one is not shown beside it
     doubt: float = 0.1  # least probability of existence with which a track competes for detections
@@ -79,7 +80,7 @@ class TrackerConfig:
     hide_below: float = 0.4  # and below which it is shown no more
     delete_below: float = 1e-4
     merge_distance: float | None = None  # m (2-D: 10, 3-D: 30)
-    lonely_bearings: bool = True
+    lonely_bearings: bool = True  # bearings update only where nobody else could claim them
     blob_share: float = 0.0  # probability that a second bearing beside a shown track is a target in the same blob
     clutter_memory: float = 30.0  # looks
     coast_after: float = 4.0  # s without a hit after which a shown track counts as coasting

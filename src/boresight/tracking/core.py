@@ -132,6 +132,7 @@ def _settings(
         static_share=config.static_share,
         static_q=config.static_q,
         stop_floor=config.stop_floor,
+        start_speed=config.start_speed,
         targets_at_start=config.targets_at_start,
         doubt=config.doubt,
         delete_below=config.delete_below,
