@@ -40,6 +40,7 @@ SPREAD = {
     "static_share": 0.3,
     "static_q": 0.3,
     "stop_floor": 0.4,
+    "start_speed": 0.3,
     "doubt": 0.4,
     "hide_below": 0.15,
     "merge_distance": 0.1,
