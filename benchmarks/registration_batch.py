@@ -101,7 +101,7 @@ def with_truth(recording: Recording, settings: TrackerConfig) -> dict[str, tuple
         e = settings.sensors.get(one.id, SensorErrors())
         wander = np.array([e.bias_range, e.bias_azimuth, e.bias_elevation, 0.0, *[e.bias_position] * 3])
         coloured[i] = Coloured(wander, e.bias_time)
-    batch = BatchConfig(settings.q or DEFAULT_Q[2], np.array(PRIOR), coloured, extent=EXTENT)
+    batch = BatchConfig(settings.q or DEFAULT_Q[2], np.array(PRIOR), coloured, extent=settings.extent or EXTENT)
     got = estimate(observed, sensors, batch, true, True)
     return {
         sensors[int(got.sensor[k])].id: (float(got.value[k]), math.sqrt(got.covariance[k, k]))

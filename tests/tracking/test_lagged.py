@@ -136,3 +136,37 @@ def test_smoothing_gains_and_stays_honest() -> None:
     assert np.mean(squares[6.0]) < 0.8 * np.mean(squares[None])
     # 16 target runs of about 3 independent errors each (smoothed ones last longer): sigma 2 / sqrt(48) = 0.29; four
     assert 2.0 - 1.16 < np.mean(nees) < 2.0 + 1.16
+
+
+def test_what_no_average_takes_away() -> None:
+    """Boats that are reported at a point of theirs, constant, which nobody knows: `extent` makes the rows honest."""
+    recording, extent = lone_target(), 2.5
+    rng = np.random.default_rng(8)
+    t = recording.detections.t
+    nees: dict[tuple[str, float], list[float]] = {}
+    for _ in range(150):
+        offset = extent * rng.normal(size=2)
+        z = np.full((len(t), 7), np.nan)
+        z[:, 4:6] = np.outer(t, [3.0, 1.0]) + [10.0, -20.0] + offset + SIGMA * rng.normal(size=(len(t), 2))
+        one = dataclasses.replace(recording, detections=dataclasses.replace(recording.detections, z=z))
+        for told in (0.0, extent):
+            past: list[Rows] = []
+            config = dataclasses.replace(CONFIG, extent=told)
+            _, rows, _ = run(tracker_for(one, config), iter_scans(one), watch=lambda _, out: past.extend(out.smoothed))  # noqa: B023
+            for name, row in (("causal", rows[-1]), ("smoothed", past[-12])):
+                e = row.position[-1] - np.array([10.0 + 3.0 * row.t[-1], -20.0 + row.t[-1]])
+                nees.setdefault((name, told), []).append(float(e @ np.linalg.solve(row.covariance[-1], e)))
+    # chi-square of 2 degrees of freedom: mean 2, standard deviation 2/√150 = 0.16 of the mean of 150
+    for name in ("causal", "smoothed"):
+        assert np.mean(nees[name, extent]) == pytest.approx(2.0, abs=0.5)
+        assert np.mean(nees[name, 0.0]) > 5.0
+
+
+def test_extent_changes_nothing_but_the_covariances() -> None:
+    recording = lone_target()
+    point = run(tracker_for(recording, CONFIG), iter_scans(recording))[1]
+    wide = run(tracker_for(recording, dataclasses.replace(CONFIG, extent=2.0)), iter_scans(recording))[1]
+    assert len(point) == len(wide) > 40
+    for a, b in zip(point, wide, strict=True):
+        assert np.array_equal(a.position, b.position) and np.array_equal(a.velocity, b.velocity)
+        assert b.covariance == pytest.approx(a.covariance + 4.0 * np.eye(2), rel=1e-12)

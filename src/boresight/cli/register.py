@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 DEG = math.pi / 180.0
 DEFAULT_Q, DEFAULT_SPEED = {2: 0.1, 3: 1.0}, {2: 8.0, 3: 150.0}  # m²/s³, m/s, as the tracker takes them
 PRIOR = (2.0, 10.0, 0.02, 5.0 * DEG, 5.0 * DEG)  # s, m, 1, rad, rad: what a sensor may be off by, one sigma
-EXTENT = 2.0  # m: a target has a size, and a camera beside it points anywhere on it
+EXTENT = 2.0  # m: a target has a size, and a camera beside it points anywhere on it; where the settings say nothing
 TOLD = SensorErrors(offset_time=1.0, offset_range=5.0, offset_azimuth=2.0 * DEG)  # where a file is silent
 SLOW = SensorErrors(bias_azimuth=0.5 * DEG, bias_time=20.0, decorrelation=1.0)  # of cameras, where a file is silent
 PREFERRED = (SensorKind.POSITION, SensorKind.LIDAR, SensorKind.OPTICAL, SensorKind.INFRARED, SensorKind.RADAR)
@@ -126,7 +126,8 @@ def fit(recording: Recording, settings: TrackerConfig, ids: list[str] | None, ba
     observed = observed_of(recording, track, tracker.poses, tracker.used, alike)
     flat, d = recording.dimensions == 2, recording.dimensions
     speed = settings.speed_sigma or DEFAULT_SPEED[d]
-    batch = BatchConfig(settings.q or DEFAULT_Q[d], np.array(PRIOR), coloured, speed_sigma=2.0 * speed, extent=EXTENT)
+    extent = settings.extent or EXTENT
+    batch = BatchConfig(settings.q or DEFAULT_Q[d], np.array(PRIOR), coloured, speed_sigma=2.0 * speed, extent=extent)
     return estimate(observed, recording.sensors, batch, base, flat), observed.tracks
 
 

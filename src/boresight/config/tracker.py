@@ -40,6 +40,7 @@ TRACKER_KEYS = {
     "blob_share": ("blob_share", 1.0),
     "lonely_bearings": ("lonely_bearings", 1.0),
     "clutter_memory_looks": ("clutter_memory", 1.0),
+    "extent_m": ("extent", 1.0),
     "coast_after_s": ("coast_after", 1.0),
     "window_s": ("window", 1.0),
     "smoothing_lag_s": ("smoothing_lag", 1.0),
@@ -93,6 +94,7 @@ class TrackerTable(TableModel, frozen=True):
     blob_share: float | None = None
     lonely_bearings: bool | None = None
     clutter_memory_looks: float | None = None
+    extent_m: float | None = None
     coast_after_s: float | None = None
     window_s: float | None = None
     smoothing_lag_s: float | None = None

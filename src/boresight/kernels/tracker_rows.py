@@ -171,7 +171,10 @@ def rows_before(
 def add_rows(
     tr: Tracks, s: Settings, t: float, t_known: float, coast_after: float, rows: RowTable, models: Models | None
 ) -> None:
-    """Predict the shown tracks to time `t` (s) and add those that are still probable then; there must be room."""
+    """Predict the shown tracks to time `t` (s) and add those that are still probable then; there must be room.
+
+    The filter's place is that of the point that is reported; what is meant by the target's place lies `extent` from it.
+    """
     d = s.d
     used = rows.used[0]
     dt = max(0.0, t - tr.time[0])
@@ -192,6 +195,6 @@ def add_rows(
             for b in range(d):
                 cross = tr.P[i, a, d + b] + tr.P[i, b, d + a]
                 rows.covariance[used, a, b] = tr.P[i, a, b] + dt * cross + dt * dt * tr.P[i, d + a, d + b]
-            rows.covariance[used, a, a] += q3
+            rows.covariance[used, a, a] += q3 + s.extent**2
         used += 1
     rows.used[0] = used

@@ -83,6 +83,7 @@ class TrackerConfig:
     lonely_bearings: bool = True  # bearings update only where nobody else could claim them
     blob_share: float = 0.0  # probability that a second bearing beside a shown track is a target in the same blob
     clutter_memory: float = 30.0  # looks
+    extent: float = 0.0  # m, per axis: how far the point of a target that is reported lies from the one that is meant
     coast_after: float = 4.0  # s without a hit after which a shown track counts as coasting
     smoothing_lag: float | None = None  # s: also give the tracks of so long ago, smoothed with all that came since
     window: float | None = (
@@ -95,6 +96,7 @@ class TrackerConfig:
         _check(self, "tracker", SHARES, lambda v: 0.0 <= v <= 1.0, "must lie in [0, 1]")
         _check(self, "tracker", NOT_NEGATIVE, lambda v: v >= 0.0, "must not be negative")
         _check(self, "tracker", ("clutter_memory",), lambda v: v >= 1.0, "must be 1 or more")
+        _check(self, "tracker", ("extent",), lambda v: 0.0 <= v < math.inf, "must be finite and not negative")
         _check(self, "tracker", TIMES, lambda v: 0.0 < v < math.inf, "must be positive and finite")
         if not 0.5 <= self.gate_probability < 1.0:
             raise UserError("tracker: gate_probability must lie in [0.5, 1)")

@@ -148,6 +148,7 @@ def _settings(
         clutter_memory=config.clutter_memory,
         blob=max([t.resolution for t in ranging], default=0.0),
         blob_share=config.blob_share,
+        extent=config.extent,
     )
 
 

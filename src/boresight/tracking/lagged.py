@@ -49,7 +49,7 @@ def smoothed_rows(window: Window, plan: Plan, after: float, until: float, t_know
         x, P = _back(tracks, here, plan.settings, dt, q, x[there], P[there])
         t -= dt
         if t <= until:
-            out.append(_rows(birth, x, P, t, t_known, t - hit > coast, plan.settings.d))
+            out.append(_rows(birth, x, P, t, t_known, t - hit > coast, plan.settings))
     return out[::-1]
 
 
@@ -99,9 +99,9 @@ def _rows(
     t: float,
     t_known: float,
     coasting: NDArray[np.bool_],
-    d: int,
+    s: Settings,
 ) -> Rows:
-    n = len(birth)
+    n, d = len(birth), s.d
     return Rows(
         t=np.full(n, t),
         t_known=np.full(n, t_known),
@@ -110,5 +110,5 @@ def _rows(
         coasting=coasting,
         position=x[:, :d].copy(),
         velocity=x[:, d : 2 * d].copy(),
-        covariance=P[:, :d, :d].copy(),
+        covariance=P[:, :d, :d] + s.extent**2 * np.eye(d),
     )
