@@ -168,5 +168,6 @@ def test_extent_changes_nothing_but_the_covariances() -> None:
     wide = run(tracker_for(recording, dataclasses.replace(CONFIG, extent=2.0)), iter_scans(recording))[1]
     assert len(point) == len(wide) > 40
     for a, b in zip(point, wide, strict=True):
-        assert np.array_equal(a.position, b.position) and np.array_equal(a.velocity, b.velocity)
+        assert np.array_equal(a.position, b.position)
+        assert np.array_equal(a.velocity, b.velocity)
         assert b.covariance == pytest.approx(a.covariance + 4.0 * np.eye(2), rel=1e-12)

@@ -120,7 +120,7 @@ class Settings(NamedTuple):
     clutter_memory: float  # looks
     blob: float  # m, the largest resolution of the ranging sensors in use
     blob_share: float  # probability that a second bearing beside a shown track is a second target in its blob
-    extent: float  # m, per axis: from the point of a target that is reported to the one that is meant; only rows know it
+    extent: float  # m, per axis: from the point of a target that is reported to the one that is meant; in rows
 
 
 class Models(NamedTuple):
