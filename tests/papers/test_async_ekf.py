@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from boresight.papers.async_ekf import doppler
@@ -54,11 +56,11 @@ def test_doppler_and_temperature() -> None:
 
 
 @pytest.mark.slow
-def test_many_runs() -> None:
+@pytest.mark.parametrize(("name", "check"), [("S0", check_s0), ("S2", check_s2)])
+def test_many_runs(name: str, check: Callable[[dict[str, dict[str, float]], float], None]) -> None:
     """`boresight paper async_ekf` runs 500; the bank of adaptive q, eleven filters, 40 here."""
     names = tuple(m for m in METHODS if m != "adaptive_q")
-    for name, check in (("S0", check_s0), ("S2", check_s2)):
-        rows = {row["method"]: row for row in table(name, 150, 1, names)}
-        bank = {row["method"]: row for row in table(name, 40, 1, ("adaptive_q", "cv"))}
-        check(rows | {"adaptive_q": bank["adaptive_q"]}, 0.01)
-        assert bank["adaptive_q"]["position_m"] < 1.05 * bank["cv"]["position_m"]
+    rows = {row["method"]: row for row in table(name, 150, 1, names)}
+    bank = {row["method"]: row for row in table(name, 40, 1, ("adaptive_q", "cv"))}
+    check(rows | {"adaptive_q": bank["adaptive_q"]}, 0.01)
+    assert bank["adaptive_q"]["position_m"] < 1.05 * bank["cv"]["position_m"]
