@@ -74,7 +74,7 @@ def test_evidence_is_the_librarys_existence() -> None:
     d2 = ((x[:, None] - z[None]) ** 2).sum(axis=2) / 4.0
     loglik = (-0.5 * d2 - math.log(2.0 * math.pi * 4.0) - math.log(density)).ravel()
     start, column = np.arange(n + 1) * m, np.tile(np.arange(m), n)
-    found = shares(tr, plan.settings, start, column, loglik, np.full(n, p_d), m)
+    found = shares(tr, plan.settings, plan.sensors[0], start, column, loglik, np.full(n, p_d), m)
     ratio = 1.0 - p_d + found.reshape(n, m).sum(axis=1)
     after = existence * ratio / (existence * ratio + 1.0 - existence)
     library = jpda.associate(
@@ -89,7 +89,7 @@ def test_a_lone_track_takes_the_detection_as_it_is() -> None:
     tr.live[0] = 1
     tr.weight[0] = 0.5, 0.0, 0.0, 0.5
     loglik = np.array([0.3, -1.0])
-    found = shares(tr, plan.settings, np.array([0, 2]), np.array([0, 1]), loglik, np.array([0.8]), 2)
+    found = shares(tr, plan.settings, plan.sensors[0], np.array([0, 2]), np.array([0, 1]), loglik, np.array([0.8]), 2)
     np.testing.assert_allclose(found, 0.8 * np.exp(loglik), rtol=1e-12)
 
 

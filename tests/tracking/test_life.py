@@ -95,7 +95,7 @@ def test_a_sensor_that_moves_no_tracks_is_evidence_alone() -> None:
 @pytest.mark.parametrize("share", [0.0, 0.1, 1.0])
 def test_an_eye_may_pass_over_what_does_not_move(share: float, association: str) -> None:
     """A look's evidence is 1 - p + p L for a target, 1 - p' + p' L for an object, p' = share p; L from the former."""
-    used = tracker({"eye": SensorErrors(sees_static=share, moves_tracks=False, association=association)})
+    used = tracker({"eye": SensorErrors(sees_static=share, association=association)})
     state = after(used, [[300.0, 400.0]])
     w = state.window.tracks.weight[0]
     for azimuth, t in (([], 10.0), ([np.arctan2(300.0, 400.0) + 0.005], 12.0)):

@@ -60,7 +60,7 @@ def bearings(azimuth: list[float]) -> Look:
 
 def filled(seed: int, n: int, models: Models | None) -> Tracks:
     """Tracks in which every number of every field is different; n of them live, with room for one more."""
-    errors = {"a": SensorErrors(bias_position=1.0, offset_time=0.1)}
+    errors = {"a": SensorErrors(bias_position=1.0, offset_time=0.1, sees_targets=0.5)}
     config = TrackerConfig(q_manoeuvre=None if models is None else models.q, sensors=errors)
     plan = make_plan(config, (sensor("a"), sensor("b")), 2)
     rng = np.random.default_rng(seed)

@@ -62,6 +62,7 @@ SENSOR_KEYS = {
     "report_range_m": ("report_range", 1.0),
     "moves_tracks": ("moves_tracks", 1.0),
     "sees_static": ("sees_static", 1.0),
+    "sees_targets": ("sees_targets", 1.0),
     "association": ("association", 1.0),
 }
 
@@ -120,6 +121,7 @@ class ErrorsTable(TableModel, frozen=True):
     report_range_m: float | None = None
     moves_tracks: bool | None = None
     sees_static: float | None = None
+    sees_targets: float | None = None
     association: str | None = None
 
 

@@ -48,6 +48,7 @@ class Tracks(NamedTuple):
     bank: FloatArray  # (k, k + 1) what ended tracks had learned of them
     undetected: FloatArray  # (1,) expected number of targets that no track follows yet
     seen_range: FloatArray  # (n_sensors,) m, longest range so far (stands in for a coverage without end)
+    witness: FloatArray  # (cap, w, 2) of w sensors: it reports this target at all, something else stands there
     mode: PerModel = None  # (cap, 2) probabilities of the models of motion, and
     mode_x: PerModel = None  # (cap, 2, n) their states, of which x and P are the moments
     mode_P: PerModel = None  # (cap, 2, n, n)
@@ -87,6 +88,9 @@ class SensorTable(NamedTuple):
     resolution: float  # m: nearer targets may give one detection together
     moves_tracks: bool  # False: its detections are evidence that a track exists, but do not move it
     sees_static: float  # detection probability of an object that does not move, as a share of a target's
+    sees_targets: float  # share of targets that the sensor reports at all
+    witness: int  # its place in `Tracks.witness`, -1 for none
+    gate_width: float  # rad, azimuth that the gate of a track covers whose place is known
     joint: bool  # tracks share its detections (JPDA) instead of taking one each
 
 

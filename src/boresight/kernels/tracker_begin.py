@@ -66,6 +66,8 @@ def begin(
         fix, J, R, mask = at.fix[k], at.J[k], at.R[k], at.mask[k]
         i = new_track(tr, s, look, k, 1 << (sensor.number % 62))
         x, P = tr.x[i], tr.P[i]
+        if sensor.witness >= 0:
+            tr.witness[i, sensor.witness, 0] = 1.0
         if extras is not None:
             tell(tr, i, s, pooled)
         for e in range(3):  # position covariance from noise and bias, and what it shares with the bias
@@ -125,6 +127,9 @@ def new_track(tr: Tracks, s: Settings, look: Look, k: int, heard: int) -> int:
         tr.anchor[i, a] = 0.0
         for b in range(3):
             tr.anchor_P[i, a, b] = 0.0
+    for a in range(tr.witness.shape[1]):
+        for b in range(2):
+            tr.witness[i, a, b] = -1.0
     tr.birth[i] = look.row[k]
     tr.heard[i] = heard
     tr.life[i, 0] = look.t + look.dt[k]

@@ -24,6 +24,7 @@ EACH = (
     "heard",
     "beside",
     "told",
+    "witness",
     "mode",
     "mode_x",
     "mode_P",
@@ -56,6 +57,7 @@ class Copies(NamedTuple):
     heard: IntArray  # (N,)
     beside: IntArray  # (N,)
     told: FloatArray  # (N, k, k + 1)
+    witness: FloatArray  # (N, w, 2)
     mode: PerModel = None  # (N, 2)
     mode_x: PerModel = None  # (N, 2, n)
     mode_P: PerModel = None  # (N, 2, n, n)
@@ -121,6 +123,7 @@ def keep(copies: Copies, tr: Tracks, t: float, number: int, models: Models | Non
     put1(copies.heard, a, tr.heard, 0, n)
     put1(copies.beside, a, tr.beside, 0, n)
     put3(copies.told, a, tr.told, 0, n)
+    put3(copies.witness, a, tr.witness, 0, n)
     if models is not None:
         put_models(copies, a, tr, 0, n)
 
@@ -147,6 +150,7 @@ def restore(copies: Copies, c: int, tr: Tracks, models: Models | None) -> None:
     put1(tr.heard, 0, copies.heard, a, n)
     put1(tr.beside, 0, copies.beside, a, n)
     put3(tr.told, 0, copies.told, a, n)
+    put3(tr.witness, 0, copies.witness, a, n)
     if models is not None:
         put_models(tr, 0, copies, a, n)
 

@@ -114,7 +114,7 @@ def gate_all(
         start[i] = used
         if p_d[i] <= 0.0:
             continue
-        there = existence(tr, i, s)
+        there = existence(tr, i, s, sensor)
         log_hit = log_miss = 0.0  # filled where they are needed: most tracks have no candidate
         last_pose, last_kind = -1, 0
         first, last = 0, m

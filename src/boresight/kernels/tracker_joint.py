@@ -28,7 +28,14 @@ LEAST_SHARE = 1e-6
 
 @njit(cache=True)
 def shares(
-    tr: Tracks, s: Settings, start: IntArray, column: IntArray, loglik: FloatArray, p_d: FloatArray, m: int
+    tr: Tracks,
+    s: Settings,
+    sensor: SensorTable,
+    start: IntArray,
+    column: IntArray,
+    loglik: FloatArray,
+    p_d: FloatArray,
+    m: int,
 ) -> FloatArray:
     """Return (pairs,) each pair's likelihood ratio p_D N/λ, lowered by what other tracks claim of the detection.
 
@@ -40,7 +47,7 @@ def shares(
     miss = np.ones(n)
     there = np.empty(n)
     for i in range(n):
-        there[i] = existence(tr, i, s)
+        there[i] = existence(tr, i, s, sensor)
         miss[i] = 1.0 - there[i] * p_d[i]
         for e in range(start[i], start[i + 1]):
             weight[e] = there[i] * p_d[i] * math.exp(min(loglik[e], 100.0))

@@ -76,6 +76,9 @@ def sensor_at(sensors: Any, i: int) -> SensorTable:
         sensors.resolution[i],
         sensors.moves_tracks[i],
         sensors.sees_static[i],
+        sensors.sees_targets[i],
+        sensors.witness[i],
+        sensors.gate_width[i],
         sensors.joint[i],
     )
 

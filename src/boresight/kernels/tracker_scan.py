@@ -31,7 +31,8 @@ from boresight.kernels.tracker_joint import shares, take_shares
 from boresight.kernels.tracker_place import covered, places_of, within
 from boresight.kernels.tracker_predict import predict_all
 from boresight.kernels.tracker_split import begin_beside, keep_beside, unplaced
-from boresight.kernels.tracker_weigh import evidence, follow_blob, merged, take, weigh
+from boresight.kernels.tracker_weigh import evidence, follow_blob, merged, note_hit, take, weigh
+from boresight.kernels.tracker_witness import corroborate, in_view, learn_reports, presence, reports
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
@@ -71,20 +72,28 @@ def scan_step(
     for i in range(n_tracks):
         if col_of_row[i] >= 0:
             row_of_col[col_of_row[i]] = i
-    claims = np.zeros(m, np.int64)
-    count_claims(tr, start, column, claims)
-    temper = independence(tr, sensor, look)
+    claims, rivals = np.zeros(m, np.int64), np.zeros(m)
+    count_claims(tr, sensor, p_d, start, column, claims, rivals)
+    temper, elapsed = independence(tr, sensor, look)
     share = loglik
     if extras is not None and (sensor.joint or (s.blob_share > 0.0 and not sensor.ranging and unplaced(tr))):
-        share = shares(tr, s, start, column, loglik, p_d, m)
+        share = shares(tr, s, sensor, start, column, loglik, p_d, m)
     for i in range(n_tracks):
         if p_d[i] <= 0.0:
             pass_over(tr, i, s, sensor, look.t, temper)
             continue
         k = col_of_row[i]
-        shy = s.lonely_bearings and not sensor.ranging and not sensor.joint and tr.heard[i] > 0
-        if shy and contested(start[i], start[i + 1], column, claims, credible(tr, i)):
-            if k >= 0:  # ambiguous: neither evidence nor update
+        bearing = not sensor.ranging and not sensor.joint and tr.heard[i] > 0
+        confirms = bearing and not sensor.moves_tracks
+        own = credible(tr, i, sensor, p_d[i])
+        found, rival = 1, 0.0
+        if confirms:
+            view = in_view(tr, i, sensor, p_d[i])
+            found, rival = presence(start[i], start[i + 1], column, claims, rivals, own, view)
+        elif bearing and s.lonely_bearings and contested(start[i], start[i + 1], column, claims, own):
+            found = -1
+        if found < 0:  # ambiguous: neither evidence nor update
+            if k >= 0:
                 row_of_col[k] = -1
                 fate[k] = UNASSOCIATED
             continue
@@ -95,6 +104,11 @@ def scan_step(
             fate[k] = UPDATED
             owner[k] = tr.birth[i]
             nis_of[k] = distance[e]
+        if confirms:
+            corroborate(tr, i, sensor, p_d[i], found == 1, rival, temper, elapsed)
+            if k >= 0:
+                note_hit(tr, i, s, sensor, look.t + look.dt[k], False, models)
+            continue
         blob = merged(tr, i, s, sensor, col_of_row) if k < 0 else -1
         if blob >= 0:
             if at.there[blob]:
@@ -103,7 +117,9 @@ def scan_step(
         if extras is not None and (sensor.joint or (tr.heard[i] == 0 and not sensor.ranging)):
             take_shares(tr, i, s, sensor, look, at, room, start, column, share, k, p_d[i], temper, models)
             continue
-        log_visible, log_static = evidence(i, start, column, loglik, row_of_col, p_d[i], sensor.sees_static)
+        p_seen = p_d[i] * reports(tr, i, sensor, elapsed)
+        log_visible, log_static = evidence(i, start, column, loglik, row_of_col, p_seen, sensor.sees_static)
+        learn_reports(tr, i, sensor, p_d[i], log_visible)
         if k >= 0:
             take(tr, i, s, sensor, look, k, at, room, log_visible, log_static, temper, models)
         else:
@@ -138,18 +154,32 @@ def screen(
 
 
 @njit(**LEAF)
-def credible(tr: Tracks, i: int) -> bool:
-    """Whether track `i` has a say in whose a detection is."""
-    return bool(tr.life[i, 2] > 0.0 or 1.0 - tr.weight[i, NOTHING] > 0.5)
+def credible(tr: Tracks, i: int, sensor: SensorTable, p_d: float) -> bool:
+    """Whether track `i` has a say in whose a detection is: it is shown, or this sensor would see it if any.
+
+    `p_d` is the probability that it is detected where it stands.
+    """
+    return bool(tr.life[i, 2] > 0.0 or in_view(tr, i, sensor, p_d) > 0.5)
 
 
 @njit(**LEAF)
-def count_claims(tr: Tracks, start: IntArray, column: IntArray, claims: IntArray) -> None:
-    """Add to `claims` (m,) how many credible tracks could claim each detection."""
+def count_claims(
+    tr: Tracks,
+    sensor: SensorTable,
+    p_d: FloatArray,
+    start: IntArray,
+    column: IntArray,
+    claims: IntArray,
+    rivals: FloatArray,
+) -> None:
+    """Add to `claims` (m,) how many credible tracks could claim each detection, to `rivals` (m,) what all expect."""
     for i in range(len(start) - 1):
-        if credible(tr, i):
+        if start[i + 1] > start[i]:
+            there = in_view(tr, i, sensor, p_d[i])
+            counts = credible(tr, i, sensor, p_d[i])
             for e in range(start[i], start[i + 1]):
-                claims[column[e]] += 1
+                claims[column[e]] += int(counts)
+                rivals[column[e]] += there
 
 
 @njit(**LEAF)
@@ -159,14 +189,17 @@ def contested(first: int, end: int, column: IntArray, claims: IntArray, own: boo
 
 
 @njit(**LEAF)
-def independence(tr: Tracks, sensor: SensorTable, look: Look) -> float:
-    """Return how much of a look is new evidence since the sensor's last one, 0 to 1, and note its time and place."""
+def independence(tr: Tracks, sensor: SensorTable, look: Look) -> tuple[float, float]:
+    """Return how much of a look is new evidence since the sensor's last one, 0 to 1, and how long ago that was (s).
+
+    Notes the look's time and place.
+    """
     last = tr.last_look[sensor.number]
-    elapsed = look.t - last[0]
+    elapsed = max(look.t - last[0], 0.0)
     last[0] = look.t
     for a in range(3):
         last[1 + a] = look.sensor_position[len(look.dt), a]
-    return min(1.0, max(elapsed, 0.0) / sensor.decorrelation) if sensor.decorrelation > 0.0 else 1.0
+    return (min(1.0, elapsed / sensor.decorrelation) if sensor.decorrelation > 0.0 else 1.0), elapsed
 
 
 @njit(**LEAF)

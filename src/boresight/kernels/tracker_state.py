@@ -9,15 +9,17 @@ from numba import njit
 from boresight.kernels.measurement import measure, measure_axes, wrap
 from boresight.kernels.options import LEAF
 from boresight.kernels.registration import N_PARAMETERS, TIME, sensitivity
-from boresight.kernels.tracker import HIDDEN, NOTHING, IntArray, Look, SensorTable, Settings, Tracks
+from boresight.kernels.tracker import HIDDEN, NOTHING, STATIC, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
 
 @njit(**LEAF)
-def existence(tr: Tracks, i: int, s: Settings) -> float:
-    """Return the probability with which track `i` competes for detections: that it is there and not hidden."""
-    return float(max(min(1.0 - tr.weight[i, NOTHING] - tr.weight[i, HIDDEN], 1.0 - 1e-9), s.doubt))
+def existence(tr: Tracks, i: int, s: Settings, sensor: SensorTable) -> float:
+    """Return the probability with which track `i` competes for detections: that it is there for this sensor to see."""
+    w = tr.weight[i]
+    there = 1.0 - w[NOTHING] - w[HIDDEN] - (1.0 - sensor.sees_static) * w[STATIC]
+    return float(max(min(there, 1.0 - 1e-9), s.doubt))
 
 
 @njit(**LEAF)

@@ -46,6 +46,7 @@ class SensorErrors:
     resolution: float = 0.0  # m: targets nearer to each other may give one detection together (ranging sensors)
     moves_tracks: bool = True  # False: its detections are evidence that a track exists, but do not move it
     sees_static: float = 1.0  # detection probability of objects that do not move, as a share of that of targets
+    sees_targets: float = 1.0  # share of targets that this sensor reports at all
     association: str | None = None  # "nearest" or "jpda" for this sensor's detections (None: as the tracker's)
     report_range: float = float("inf")  # m: targets farther from all ranging sensors are not shown
 
@@ -111,7 +112,7 @@ class TrackerConfig:
             where = f"sensor['{sensor}']"
             _check(errors, where, ("bias_time", "fade_range"), lambda v: v > 0.0, "must be positive")
             _check(errors, where, SPREADS, lambda v: 0.0 <= v < math.inf, "must be finite and not negative")
-            _check(errors, where, ("sees_static",), lambda v: 0.0 <= v <= 1.0, "must lie in [0, 1]")
+            _check(errors, where, ("sees_static", "sees_targets"), lambda v: 0.0 <= v <= 1.0, "must lie in [0, 1]")
             if errors.association is not None:
                 _check_association(errors.association, where)
 

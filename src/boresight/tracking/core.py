@@ -48,6 +48,7 @@ def make_plan(
     sigma: list[float] = []
     tau: list[float] = []
     tables = []
+    gate = math.sqrt(chi2.ppf(config.gate_probability, 1))
     constants = [np.full(N_PARAMETERS, -1, np.int64) for _ in sensors]  # filled when the number of biases is known
     report_range = np.zeros(len(sensors))
     known: list[tuple[float, tuple[int, int]]] = []  # sigma, (sensor, parameter) of the constant errors
@@ -61,12 +62,19 @@ def make_plan(
                 tau.append(errors.bias_time)
             known += [(v, (index, p)) for p, v in _constants(sensor, errors, flat)]
         joint = (errors.association or config.association) == "jpda"
-        tables.append(_table(index, sensor, errors, bias, constants[index], joint))
+        tables.append(_table(index, sensor, errors, bias, constants[index], joint, gate))
     sigma += [value for value, _ in known]
     tau += [math.inf] * len(known)
     for place, (_, (index, parameter)) in enumerate(known):
         constants[index][parameter] = 2 * d + len(sigma) - len(known) + place
-    tables = [t._replace(registers=bool((t.constant >= 0).any())) for t in tables]
+    witnesses = [t.number for t in tables if _bears_witness(t) and (used is None or t.number in used)]
+    tables = [
+        t._replace(
+            registers=bool((t.constant >= 0).any()),
+            witness=witnesses.index(t.number) if t.number in witnesses else -1,
+        )
+        for t in tables
+    ]
     ranging = [t for t in tables if t.ranging and (used is None or t.number in used)]
     for table in ranging:
         report_range[table.number] = config.sensors.get(sensors[table.number].id, SensorErrors()).report_range
@@ -74,15 +82,21 @@ def make_plan(
     n = 2 * d + len(sigma)
     extras = bool(known or config.blob_share > 0.0 or any(t.joint for t in tables)) or None
     models = _models(config, settings.q)
-    empty = _before_all(settings, tables, n, models is not None)
+    empty = _before_all(settings, tables, n, len(witnesses), models is not None)
     return Plan(settings, tuple(tables), n, columns_of(tuple(tables)), empty, extras, models)
 
 
+def _bears_witness(sensor: SensorTable) -> bool:
+    """Whether each track keeps what this sensor tells of it: it may pass it over, or its bearings only confirm."""
+    return sensor.sees_targets < 1.0 or not (sensor.ranging or sensor.moves_tracks)
+
+
 def _table(
-    number: int, sensor: Sensor, errors: SensorErrors, bias: IntArray, constant: IntArray, joint: bool
+    number: int, sensor: Sensor, errors: SensorErrors, bias: IntArray, constant: IntArray, joint: bool, gate: float
 ) -> SensorTable:
-    """Pack one sensor; `registers` is set once its constant errors have their states."""
+    """Pack one sensor; `registers` and `witness` are set once their places are known. `gate` is in σ."""
     c = sensor.coverage
+    sigma = sensor.sigma[Component.AZIMUTH]
     span = c.azimuth[1] - c.azimuth[0]
     if span <= 0.0:
         span += 2.0 * math.pi
@@ -105,6 +119,9 @@ def _table(
         resolution=errors.resolution,
         moves_tracks=errors.moves_tracks,
         sees_static=errors.sees_static,
+        sees_targets=errors.sees_targets,
+        witness=-1,
+        gate_width=2.0 * gate * math.hypot(sigma if math.isfinite(sigma) else 0.0, errors.bias_azimuth),
         joint=joint,
     )
 
@@ -192,7 +209,7 @@ def _constants(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[i
     ]
 
 
-def _before_all(settings: Settings, sensors: Sequence[SensorTable], n: int, models: bool) -> Copies:
+def _before_all(settings: Settings, sensors: Sequence[SensorTable], n: int, witnesses: int, models: bool) -> Copies:
     """Return one copy of a table without tracks of `n` states, which two models have too if wanted."""
     k = settings.n_constant
     clutter = np.zeros((len(sensors), AZIMUTH_BINS + 1))
@@ -214,6 +231,7 @@ def _before_all(settings: Settings, sensors: Sequence[SensorTable], n: int, mode
         heard=np.zeros(0, np.int64),
         beside=np.zeros(0, np.int64),
         told=np.zeros((0, k, k + 1)),
+        witness=np.zeros((0, witnesses, 2)),
         bank=np.zeros((k, k + 1)),
         undetected=np.full(1, settings.targets_at_start),
         seen_range=np.zeros(len(sensors)),

@@ -21,7 +21,7 @@ from boresight.tracking.tracker import Tracker, TrackerState
 from boresight.tracking.window import Window, held
 
 Arrays = dict[str, NDArray[np.generic]]
-FORMAT = 5
+FORMAT = 6
 
 
 def snapshot(state: TrackerState) -> TrackerState:

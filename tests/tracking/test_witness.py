@@ -1,0 +1,146 @@
+"""What sensors bear witness to: confirmation that counts once, targets that a sensor passes over, who claims what."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from boresight.kernels.tracker import AZIMUTH_BINS, NOTHING, STATIC, VISIBLE
+from boresight.kernels.tracker_witness import LEAST_CHANCE, MEMORY, PASSING
+from boresight.tracking.config import SensorErrors, TrackerConfig
+from boresight.tracking.tracker import Tracker, TrackerState
+from boresight.types import FATES, Coverage, Fate
+from tests.tracking.test_life import FOR_EVER, P_EYE, P_RADAR, after, doubted, glance, odds, tracker
+from tests.tracking.test_rules import points, sensor
+
+TOWARDS = float(np.arctan2(300.0, 400.0))  # rad, from the origin to the track of these tests
+WAVERING = 0.02  # rad, of the eye's bearings, slowly
+
+
+def confirming(**errors: float) -> Tracker:
+    return tracker({"eye": SensorErrors(moves_tracks=False, bias_azimuth=WAVERING, **errors)})
+
+
+def chance_of(state: TrackerState) -> float:
+    """Probability of a false detection that lasts within a gate, from how many a look has on average."""
+    width = 2.0 * np.sqrt(chi2.ppf(TrackerConfig().gate_probability, 1)) * np.hypot(0.01, WAVERING)
+    expected = state.window.tracks.clutter[1, AZIMUTH_BINS] * width / (2.0 * np.pi)
+    return max(1.0 - float(np.exp(-expected)), LEAST_CHANCE)
+
+
+@pytest.mark.parametrize("clutter", [0.0, 8.0])
+@pytest.mark.parametrize("there", [True, False])
+def test_one_look_is_bayes_rule_over_all_that_could_be(there: bool, clutter: float) -> None:
+    """Summed over whether the sensor reports the track at all, and whether something else stands in its direction."""
+    reports, still = 0.8, 0.1
+    used = confirming(sees_targets=reports, sees_static=still)
+    state = after(used, [[300.0, 400.0]])
+    tr = state.window.tracks
+    tr.weight[0] = 0.4, 0.0, 0.3, 0.3
+    tr.clutter[1, AZIMUTH_BINS] = clutter
+    stands = chance_of(state)
+    likelihood = {}
+    for hypothesis, seen in ((VISIBLE, reports), (STATIC, still), (NOTHING, 0.0)):
+        total = 0.0
+        for mine, other in itertools.product((True, False), repeat=2):
+            weight = (seen if mine else 1.0 - seen) * (stands if other else 1.0 - stands)
+            found = 1.0 - (1.0 - P_EYE * mine) * (1.0 - (P_EYE if other else PASSING))
+            total += weight * (found if there else 1.0 - found)
+        likelihood[hypothesis] = total
+    expected = np.array([0.4, 0.3, 0.3]) * [likelihood[h] for h in (VISIBLE, STATIC, NOTHING)]
+    state, _ = used.step(state, glance(10.0, [TOWARDS] if there else []))
+    w = state.window.tracks.weight[0]
+    np.testing.assert_allclose(w[[VISIBLE, STATIC, NOTHING]], expected / expected.sum(), rtol=1e-6)
+
+
+def images(used: Tracker, state: TrackerState, azimuth: list[float], count: int, t: float) -> TrackerState:
+    for k in range(count):
+        state, _ = used.step(state, glance(t + 0.1 * k, azimuth))
+    return state
+
+
+def test_what_an_eye_sees_in_a_direction_counts_once() -> None:
+    """A hundred images are worth what one thing in that direction by chance is improbable, not its hundredth power."""
+    used = confirming()
+    state = after(used, [[300.0, 400.0]])
+    state.window.tracks.weight[0] = 1e-6, 0.0, 0.0, 1.0 - 1e-6
+    state.window.tracks.clutter[1, AZIMUTH_BINS] = 4.0
+    stands, before = chance_of(state), odds(state)
+    state = images(used, state, [TOWARDS], 50, 10.0)
+    half = odds(state) / before
+    state = images(used, state, [TOWARDS], 50, 15.0)
+    assert 0.5 / stands < half < 2.0 / stands
+    assert odds(state) / before < 2.0 * half  # independent images would have squared it
+
+
+@pytest.mark.parametrize("share", [0.8, 1.0])
+def test_images_without_a_target_cannot_refute_one_that_the_eye_may_pass_over(share: float) -> None:
+    used = confirming(sees_targets=share)
+    state = doubted(after(used, [[300.0, 400.0]]))
+    before = odds(state)
+    state = images(used, state, [], 50, 10.0)
+    assert odds(state) < before
+    assert (odds(state) > 0.1 * before) == (share < 1.0)
+
+
+@pytest.mark.parametrize("share", [0.75, 1.0])
+def test_a_lidar_that_may_never_report_a_boat_does_not_hide_it(share: float) -> None:
+    """What its 40 misses leave is the share of boats that it passes over, less what two seconds make doubtful."""
+    radar = sensor("radar", coverage=Coverage(range=(0.0, 2000.0)), p_detection=P_RADAR, clutter_per_scan=2.0)
+    lidar = sensor("lidar", coverage=Coverage(range=(0.0, 2000.0)), p_detection=0.5)
+    config = TrackerConfig(
+        q=0.1, static_share=0.0, stop_floor=0.0, sensors={"lidar": SensorErrors(sees_targets=share)}, **FOR_EVER
+    )
+    used = Tracker(config, (radar, lidar), 2)
+    state = doubted(after(used, [[300.0, 400.0]]))
+    before = odds(state)
+    for k in range(40):
+        state, _ = used.step(state, points(10.0 + 0.05 * k, [], 1))
+    assert (odds(state) > 0.2 * before) == (share < 1.0)
+
+
+def test_what_a_sensor_has_reported_it_does_report() -> None:
+    """A lidar's own track: its misses count in full at once, and as any other's after a while."""
+    radar = sensor("radar", coverage=Coverage(range=(0.0, 2000.0)), clutter_per_scan=2.0)
+    lidar = sensor("lidar", coverage=Coverage(range=(0.0, 2000.0)), p_detection=0.5)
+    config = TrackerConfig(
+        q=0.1, static_share=0.0, stop_floor=0.0, sensors={"lidar": SensorErrors(sees_targets=0.6)}, **FOR_EVER
+    )
+    used = Tracker(config, (radar, lidar), 2)
+    state = used.init()
+    for k in range(6):
+        state, _ = used.step(state, points(2.0 * k, [[300.0, 400.0]], 1, first=100 * k))
+    for pause in (1.0, MEMORY):
+        state = doubted(state)
+        before, t = odds(state), state.window.tracks.time[0]
+        state, _ = used.step(state, points(t + pause, [], 1))
+        reports = 0.6 + 0.4 * np.exp(-pause / MEMORY)
+        assert odds(state) == pytest.approx(before * (1.0 - 0.5 * reports), rel=0.02)
+        for k in range(3):
+            state, _ = used.step(state, points(t + pause + 0.2 * (k + 1), [[300.0, 400.0]], 1, first=int(1e4 * t) + k))
+
+
+@pytest.mark.parametrize(
+    ("errors", "second", "weight"),
+    [
+        ({"sees_static": 0.02}, [600.0, 800.0], (0.03, 0.0, 0.96, 0.01)),  # a buoy behind the boat
+        ({"fade_range": 600.0}, [600.0, 800.0], (0.9, 0.0, 0.0, 0.1)),  # a boat too far to be seen
+    ],
+)
+def test_a_bearing_is_not_contested_by_what_the_sensor_does_not_see(
+    errors: dict[str, float], second: list[float], weight: tuple[float, ...]
+) -> None:
+    for seen_by, fate in ((errors, Fate.UPDATED), ({}, Fate.UNASSOCIATED)):
+        used = tracker({"eye": SensorErrors(**seen_by)})
+        state = doubted(after(used, [[300.0, 400.0], second]))
+        tr = state.window.tracks
+        tr.weight[1], tr.life[1, 2] = weight, 0.0
+        before = odds(state)
+        state, _ = used.step(state, glance(10.0, [TOWARDS]))
+        assert (odds(state) > 2.0 * before) == (fate == Fate.UPDATED)
+        _, out = used.finish(state)
+        found = {int(r): FATES[f] for d in out.decisions for r, f in zip(d.row, d.fate, strict=True)}
+        assert found[9000] == fate
