@@ -56,9 +56,11 @@ SENSOR_SPREAD = {
     ("ir", "decorrelation"): 0.3,
     ("ir", "bias_azimuth"): 0.2,
     ("ir", "sees_static"): 0.5,
+    ("ir", "fade_range"): 0.25,
     ("eo", "decorrelation"): 0.3,
     ("eo", "bias_azimuth"): 0.2,
     ("eo", "sees_static"): 0.5,
+    ("eo", "fade_range"): 0.25,
 }
 
 
@@ -70,6 +72,7 @@ def candidate(config: TrackerConfig, steps: FloatArray) -> TrackerConfig:
         value = getattr(config, name)
         top[name] = (value if value is not None else 0.1) * float(np.exp(spread * next(step)))
     top["hide_below"] = min(top["hide_below"], config.confirm_above)
+    top["stop_floor"] = min(top["stop_floor"], 0.9 * (1.0 - config.confirm_above))  # above, hardly anything is shown
     sensors = dict(config.sensors)
     for (sensor, name), spread in SENSOR_SPREAD.items():
         errors = sensors[sensor]

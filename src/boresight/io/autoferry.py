@@ -42,7 +42,7 @@ SENSORS: dict[int, SensorTable] = {
         kind="radar",
         platform=PLATFORM,
         axes="platform_enu",
-        sigma_position_m=2.4,
+        sigma_position_m=2.0,
         latency_s=2.0,
         period_s=1.68,
         p_detection=0.8,
@@ -56,7 +56,7 @@ SENSORS: dict[int, SensorTable] = {
         axes="platform_enu",
         sigma_azimuth_deg=0.5,
         period_s=0.117,
-        p_detection=0.3,
+        p_detection=0.4,
         clutter_per_scan=2.0,
     ),
     4: SensorTable(
@@ -66,7 +66,7 @@ SENSORS: dict[int, SensorTable] = {
         axes="platform_enu",
         sigma_azimuth_deg=0.5,
         period_s=0.2,
-        p_detection=0.3,
+        p_detection=0.5,
         clutter_per_scan=3.0,
     ),
 }
@@ -76,21 +76,21 @@ TRACKER_TOML = """\
 # Settings for the Autoferry sensor suite, one set for all scenarios; `boresight track` uses this file unless --config
 # names another.
 [tracker]
-gate_probability = 0.97
-speed_sigma_m_s = 4.5
-birth_rate = 0.005
-targets_at_start = 2.0
-show_time_s = 5.0
-survival_time_s = 300.0
+gate_probability = 0.967
+speed_sigma_m_s = 4.9
+birth_rate = 0.0022
+targets_at_start = 1.9
+show_time_s = 4.6
+survival_time_s = 280.0
 static_share = 0.3
 static_wander_m2_s = 0.1
-stop_floor = 0.004
+stop_floor = 0.007
 start_speed_m_s = 0.7         # what stood sets off at about this speed
-doubt = 0.025
+doubt = 0.032
 confirm_above = 0.985
-hide_below = 0.4
-merge_distance_m = 16.0
-apart_m = 23.0
+hide_below = 0.5
+merge_distance_m = 18.5
+apart_m = 23.5
 blob_share = 0.1
 clutter_memory_looks = 15.0
 extent_m = 1.0                # from the part of a boat that is reported to what is meant by its place
@@ -99,7 +99,7 @@ extent_m = 1.0                # from the part of a boat that is reported to what
 id = "radar"
 bias_position_m = 1.3
 bias_time_s = 30.0
-resolution_m = 23.0
+resolution_m = 20.5
 report_range_m = 310.0
 
 [[sensor]]
@@ -107,23 +107,28 @@ id = "lidar"
 bias_position_m = 2.0
 bias_time_s = 20.0
 resolution_m = 10.0
+sees_targets = 0.75         # it never reports some boats
 report_range_m = 0.0        # begins and moves tracks; they are shown when the radar sees them
 
 [[sensor]]
 id = "ir"
-bias_azimuth_deg = 3.0      # of the kind that no two bearings agree on: evidence, not position
+bias_azimuth_deg = 2.8      # of the kind that no two bearings agree on: evidence, not position
 bias_time_s = 30.0
-decorrelation_s = 1.4
+decorrelation_s = 1.8
 moves_tracks = false
-sees_static = 0.05          # it was trained on boats, and passes over what stands about
+sees_targets = 0.9
+sees_static = 0.02          # it was trained on boats, and passes over what stands about
+fade_range_m = 400.0
 
 [[sensor]]
 id = "eo"
-bias_azimuth_deg = 3.0
+bias_azimuth_deg = 2.8
 bias_time_s = 30.0
 decorrelation_s = 1.4
 moves_tracks = false
-sees_static = 0.05
+sees_targets = 0.95
+sees_static = 0.02
+fade_range_m = 400.0
 """
 
 
