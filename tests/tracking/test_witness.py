@@ -56,6 +56,22 @@ def test_one_look_is_bayes_rule_over_all_that_could_be(there: bool, clutter: flo
     np.testing.assert_allclose(w[[VISIBLE, STATIC, NOTHING]], expected / expected.sum(), rtol=1e-6)
 
 
+def test_one_bearing_does_not_confirm_all_that_lie_in_its_direction() -> None:
+    """What speaks for a doubtful track is what the others in that direction do not account for."""
+    doubtful = 0.3
+    used = confirming()
+    state = after(used, [[300.0, 400.0], [600.0, 800.0]])
+    tr = state.window.tracks
+    tr.weight[:2], tr.life[:2, 2] = (doubtful, 0.0, 0.0, 1.0 - doubtful), 0.0
+    stands, before = chance_of(state), odds(state)
+    by_others = 1.0 - doubtful * P_EYE  # that the other track is not what is seen
+    none = 1.0 - by_others * (1.0 - stands * P_EYE - (1.0 - stands) * PASSING)
+    target = 1.0 - (1.0 - P_EYE) * (1.0 - none)
+    state, _ = used.step(state, glance(10.0, [TOWARDS]))
+    assert odds(state, 0) == pytest.approx(before * target / none, rel=1e-6)
+    assert odds(state, 1) == pytest.approx(before * target / none, rel=1e-6)
+
+
 def images(used: Tracker, state: TrackerState, azimuth: list[float], count: int, t: float) -> TrackerState:
     for k in range(count):
         state, _ = used.step(state, glance(t + 0.1 * k, azimuth))

@@ -93,7 +93,7 @@ merge_distance_m = 18.5
 apart_m = 23.5
 blob_share = 0.1
 clutter_memory_looks = 15.0
-extent_m = 1.0                # from the part of a boat that is reported to what is meant by its place
+extent_m = 1.2                # from the part of a boat that is reported to what is meant by its place
 
 [[sensor]]
 id = "radar"
