@@ -108,7 +108,7 @@ def test_a_track_begun_where_nobody_can_see_it_again_does_not_wait() -> None:
 def beside(stale: float = 0.0, azimuth: float = 0.12, models: Models | None = None) -> tuple[Plan, Tracks, list[int]]:
     """Two bearings at a shown track 150 m north, whose row 1 was another track's before; returns the fates too."""
     radar, eye = sensor("r"), sensor("e", SensorKind.OPTICAL)
-    errors = {"r": SensorErrors(resolution=25.0, offset_time=0.5, offset_azimuth=0.02)}
+    errors = {"r": SensorErrors(resolution=25.0, offset_time=0.5, offset_azimuth=0.02, sees_targets=0.5)}
     q = None if models is None else models.q
     config = TrackerConfig(q_manoeuvre=q, blob_share=0.1, merge_distance=12.0, sensors=errors)
     plan = make_plan(config, (radar, eye), 2)

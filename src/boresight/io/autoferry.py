@@ -76,59 +76,61 @@ TRACKER_TOML = """\
 # Settings for the Autoferry sensor suite, one set for all scenarios; `boresight track` uses this file unless --config
 # names another.
 [tracker]
+process_noise_m2_s3 = 0.106
 gate_probability = 0.967
-speed_sigma_m_s = 4.9
-birth_rate = 0.0022
-targets_at_start = 1.9
-show_time_s = 4.6
+speed_sigma_m_s = 4.7
+birth_rate = 0.00174
+targets_at_start = 1.81
+hide_time_s = 95.6
+show_time_s = 3.41
 survival_time_s = 280.0
-static_share = 0.3
-static_wander_m2_s = 0.1
-stop_floor = 0.007
-start_speed_m_s = 0.7         # what stood sets off at about this speed
-doubt = 0.032
+static_share = 0.333
+static_wander_m2_s = 0.0946
+stop_floor = 0.00772
+start_speed_m_s = 0.588         # what stood sets off at about this speed
+doubt = 0.037
 confirm_above = 0.985
-hide_below = 0.5
-merge_distance_m = 18.5
-apart_m = 23.5
+hide_below = 0.477
+merge_distance_m = 17.8
+apart_m = 24.8
 blob_share = 0.1
-clutter_memory_looks = 15.0
+clutter_memory_looks = 17.8
 extent_m = 1.2                # from the part of a boat that is reported to what is meant by its place
 
 [[sensor]]
 id = "radar"
-bias_position_m = 1.3
-bias_time_s = 30.0
-resolution_m = 20.5
+bias_position_m = 1.32
+bias_time_s = 19.3
+resolution_m = 21.7
 report_range_m = 310.0
 
 [[sensor]]
 id = "lidar"
-bias_position_m = 2.0
-bias_time_s = 20.0
+bias_position_m = 1.95
+bias_time_s = 18.3
 resolution_m = 10.0
 sees_targets = 0.75         # it never reports some boats
 report_range_m = 0.0        # begins and moves tracks; they are shown when the radar sees them
 
 [[sensor]]
 id = "ir"
-bias_azimuth_deg = 2.8      # of the kind that no two bearings agree on: evidence, not position
+bias_azimuth_deg = 2.87     # of the kind that no two bearings agree on: evidence, not position
 bias_time_s = 30.0
-decorrelation_s = 1.8
+decorrelation_s = 1.94
 moves_tracks = false
 sees_targets = 0.9
-sees_static = 0.02          # it was trained on boats, and passes over what stands about
-fade_range_m = 400.0
+sees_static = 0.0197        # it was trained on boats, and passes over what stands about
+fade_range_m = 405.0
 
 [[sensor]]
 id = "eo"
-bias_azimuth_deg = 2.8
+bias_azimuth_deg = 2.59
 bias_time_s = 30.0
-decorrelation_s = 1.4
+decorrelation_s = 2.12
 moves_tracks = false
 sees_targets = 0.95
-sees_static = 0.02
-fade_range_m = 400.0
+sees_static = 0.0258
+fade_range_m = 497.0
 """
 
 

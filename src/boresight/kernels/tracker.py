@@ -48,7 +48,8 @@ class Tracks(NamedTuple):
     bank: FloatArray  # (k, k + 1) what ended tracks had learned of them
     undetected: FloatArray  # (1,) expected number of targets that no track follows yet
     seen_range: FloatArray  # (n_sensors,) m, longest range so far (stands in for a coverage without end)
-    witness: FloatArray  # (cap, w, 2) of w sensors: it reports this target at all, something else stands there
+    witness: FloatArray  # (cap, w, 2) by w sensors, probabilities, -1 before its first look: it reports this
+    # target at all; were the track nothing, something else would stand in its direction
     mode: PerModel = None  # (cap, 2) probabilities of the models of motion, and
     mode_x: PerModel = None  # (cap, 2, n) their states, of which x and P are the moments
     mode_P: PerModel = None  # (cap, 2, n, n)

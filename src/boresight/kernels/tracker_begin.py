@@ -67,7 +67,7 @@ def begin(
         i = new_track(tr, s, look, k, 1 << (sensor.number % 62))
         x, P = tr.x[i], tr.P[i]
         if sensor.witness >= 0:
-            tr.witness[i, sensor.witness, 0] = 1.0
+            tr.witness[i, sensor.witness, 0] = 1.0  # it does report this one
         if extras is not None:
             tell(tr, i, s, pooled)
         for e in range(3):  # position covariance from noise and bias, and what it shares with the bias

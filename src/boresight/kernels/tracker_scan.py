@@ -32,7 +32,7 @@ from boresight.kernels.tracker_place import covered, places_of, within
 from boresight.kernels.tracker_predict import predict_all
 from boresight.kernels.tracker_split import begin_beside, keep_beside, unplaced
 from boresight.kernels.tracker_weigh import evidence, follow_blob, merged, note_hit, take, weigh
-from boresight.kernels.tracker_witness import corroborate, in_view, learn_reports, presence, reports
+from boresight.kernels.tracker_witness import corroborate, in_view, learn_reports, presence, recall, reports
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
@@ -75,6 +75,7 @@ def scan_step(
     claims, rivals = np.zeros(m, np.int64), np.zeros(m)
     count_claims(tr, sensor, p_d, start, column, claims, rivals)
     temper, elapsed = independence(tr, sensor, look)
+    by_chance = recall(tr, sensor, elapsed)
     share = loglik
     if extras is not None and (sensor.joint or (s.blob_share > 0.0 and not sensor.ranging and unplaced(tr))):
         share = shares(tr, s, sensor, start, column, loglik, p_d, m)
@@ -92,10 +93,11 @@ def scan_step(
             found, rival = presence(start[i], start[i + 1], column, claims, rivals, own, view)
         elif bearing and s.lonely_bearings and contested(start[i], start[i + 1], column, claims, own):
             found = -1
+        if k >= 0 and (found < 0 or (confirms and claims[k] > int(own))):  # nobody's
+            row_of_col[k] = -1
+            fate[k] = UNASSOCIATED
+            k = -1
         if found < 0:  # ambiguous: neither evidence nor update
-            if k >= 0:
-                row_of_col[k] = -1
-                fate[k] = UNASSOCIATED
             continue
         if k >= 0:
             e = start[i]
@@ -105,7 +107,7 @@ def scan_step(
             owner[k] = tr.birth[i]
             nis_of[k] = distance[e]
         if confirms:
-            corroborate(tr, i, sensor, p_d[i], found == 1, rival, temper, elapsed)
+            corroborate(tr, i, sensor, p_d[i], found == 1, rival, temper, by_chance)
             if k >= 0:
                 note_hit(tr, i, s, sensor, look.t + look.dt[k], False, models)
             continue
@@ -117,9 +119,9 @@ def scan_step(
         if extras is not None and (sensor.joint or (tr.heard[i] == 0 and not sensor.ranging)):
             take_shares(tr, i, s, sensor, look, at, room, start, column, share, k, p_d[i], temper, models)
             continue
-        p_seen = p_d[i] * reports(tr, i, sensor, elapsed)
+        p_seen = p_d[i] * reports(tr, i, sensor)
         log_visible, log_static = evidence(i, start, column, loglik, row_of_col, p_seen, sensor.sees_static)
-        learn_reports(tr, i, sensor, p_d[i], log_visible)
+        learn_reports(tr, i, sensor, log_visible, temper)
         if k >= 0:
             take(tr, i, s, sensor, look, k, at, room, log_visible, log_static, temper, models)
         else:

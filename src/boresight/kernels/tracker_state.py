@@ -19,7 +19,7 @@ def existence(tr: Tracks, i: int, s: Settings, sensor: SensorTable) -> float:
     """Return the probability with which track `i` competes for detections: that it is there for this sensor to see."""
     w = tr.weight[i]
     there = 1.0 - w[NOTHING] - w[HIDDEN] - (1.0 - sensor.sees_static) * w[STATIC]
-    return float(max(min(there, 1.0 - 1e-9), s.doubt))
+    return float(max(min(there, 1.0 - 1e-9), s.doubt, 1e-9))
 
 
 @njit(**LEAF)

@@ -18,7 +18,7 @@ from boresight.kernels.tracker import AZIMUTH_BINS, HIDDEN, STATIC, VISIBLE, Int
 from boresight.kernels.tracker_weigh import weigh
 from boresight.types.sensor import FloatArray
 
-MEMORY = 30.0  # s, after which what a sensor reports, or what else stands in a direction, is a new question
+MEMORY = 30.0  # s, time constant with which what was learned of either is forgotten
 PASSING = 0.05  # probability of a detection in the gate of a track where nothing that lasts stands
 LEAST_CHANCE = 0.01  # that something else stands there, where no false detection was ever seen
 UNKNOWN = -1.0  # the sensor has not looked yet
@@ -59,27 +59,38 @@ def recalled(value: float, prior: float, elapsed: float) -> float:
 
 
 @njit(**LEAF)
-def reports(tr: Tracks, i: int, sensor: SensorTable, elapsed: float) -> float:
-    """Return the probability that a sensor reports track `i` at all, `elapsed` (s) after its last look, and keep it."""
-    if sensor.witness < 0:
-        return 1.0
-    kept = tr.witness[i, sensor.witness]
-    kept[REPORTS] = recalled(kept[REPORTS], sensor.sees_targets, elapsed)
-    return float(kept[REPORTS])
+def recall(tr: Tracks, sensor: SensorTable, elapsed: float) -> float:
+    """Let all tracks forget some of what they know of a sensor that last looked `elapsed` (s) ago.
+
+    Returns the probability that, by chance, something else stands in a track's direction.
+    """
+    by_chance = chance(tr, sensor)
+    if sensor.witness >= 0:
+        for i in range(tr.live[0]):
+            kept = tr.witness[i, sensor.witness]
+            kept[REPORTS] = recalled(kept[REPORTS], sensor.sees_targets, elapsed)
+            kept[ELSE] = recalled(kept[ELSE], by_chance, elapsed)
+    return by_chance
 
 
 @njit(**LEAF)
-def learn_reports(tr: Tracks, i: int, sensor: SensorTable, p_d: float, log_visible: float) -> None:
-    """Condition that probability on a look that had the log-likelihood `log_visible` with it, `p_d` given it reports.
+def reports(tr: Tracks, i: int, sensor: SensorTable) -> float:
+    """Return the probability that a sensor reports track `i` at all."""
+    return float(tr.witness[i, sensor.witness, REPORTS]) if sensor.witness >= 0 else 1.0
 
-    Where the sensor reports the track, that is log(1 - p_d + p_d L); with probability a, log(1 - a p_d + a p_d L).
+
+@njit(**LEAF)
+def learn_reports(tr: Tracks, i: int, sensor: SensorTable, log_visible: float, temper: float) -> None:
+    """Condition that probability a on a look of log-likelihood `log_visible` = log(1 - a + a L), L where it reports.
+
+    `temper` is how much of the look is new, 0 to 1.
     """
-    if sensor.witness >= 0 and p_d > 0.0:
+    if sensor.witness >= 0:
         kept = tr.witness[i, sensor.witness]
         a = kept[REPORTS]
         if a > 0.0:
-            seen = (math.exp(log_visible) - 1.0) / a + 1.0
-            kept[REPORTS] = min(max(a * seen / math.exp(log_visible), 0.0), 1.0)
+            seen = max((math.exp(log_visible) - 1.0) / a + 1.0, 0.0)
+            kept[REPORTS] = share_of(a * seen**temper, 1.0 - a)
 
 
 @njit(**LEAF)
@@ -91,7 +102,7 @@ def chance(tr: Tracks, sensor: SensorTable) -> float:
 
 @njit(**LEAF)
 def corroborate(
-    tr: Tracks, i: int, sensor: SensorTable, p_d: float, there: bool, rival: float, temper: float, elapsed: float
+    tr: Tracks, i: int, sensor: SensorTable, p_d: float, there: bool, rival: float, temper: float, by_chance: float
 ) -> None:
     """Weigh track `i` by whether a sensor that only confirms has a detection in its gate (`there`).
 
@@ -103,27 +114,27 @@ def corroborate(
         there: what it shows.
         rival: how much of what it shows other tracks claim, 0 to 1.
         temper: how much of the look is new, 0 to 1: likelihoods to this power.
-        elapsed: s since its last look.
+        by_chance: probability that something else stands in a track's direction where nothing is known of it.
     """
     kept = tr.witness[i, sensor.witness]
-    a = recalled(kept[REPORTS], sensor.sees_targets, elapsed)
-    u = recalled(kept[ELSE], chance(tr, sensor), elapsed)
-    # the probabilities that something is seen if something else stands there, if not, if the track is none, and if it
-    # is one that the sensor reports
+    a, u = kept[REPORTS], kept[ELSE]
+    # the probabilities that something is seen if the track is none and something else stands there, or not; and if it
+    # is a target that the sensor reports: then what was seen so far was its own, and taught nothing of anything else
     left = 1.0 - rival * sensor.p_detection if there else 1.0
     stands, passing = 1.0 - (1.0 - sensor.p_detection) * left, 1.0 - (1.0 - PASSING) * left
-    empty = u * stands + (1.0 - u) * passing
-    seen = 1.0 - (1.0 - p_d) * (1.0 - empty)
+    seen = 1.0 - (1.0 - p_d) * (1.0 - by_chance * stands - (1.0 - by_chance) * passing)
     if not there:
-        stands, passing, empty, seen = 1.0 - stands, 1.0 - passing, 1.0 - empty, 1.0 - seen
+        stands, passing, seen = 1.0 - stands, 1.0 - passing, 1.0 - seen
+    stands, passing, seen = stands**temper, passing**temper, seen**temper
+    empty = u * stands + (1.0 - u) * passing
     target = a * seen + (1.0 - a) * empty
-    still = sensor.sees_static * seen + (1.0 - sensor.sees_static) * empty
-    weigh(tr, i, math.log(target / empty), math.log(still / empty), temper)
-    kept[REPORTS] = share_of(a * seen**temper, (1.0 - a) * empty**temper)
-    kept[ELSE] = share_of(u * stands**temper, (1.0 - u) * passing**temper)
+    still = sensor.sees_static * target + (1.0 - sensor.sees_static) * empty
+    weigh(tr, i, math.log(target / empty), math.log(still / empty), 1.0)
+    kept[REPORTS] = share_of(a * seen, (1.0 - a) * empty)
+    kept[ELSE] = share_of(u * stands, (1.0 - u) * passing)
 
 
 @njit(**LEAF)
 def share_of(one: float, other: float) -> float:
-    """Return what `one` is of both."""
-    return one / (one + other)
+    """Return what `one` is of both, 0 of nothing."""
+    return one / (one + other) if one > 0.0 else 0.0

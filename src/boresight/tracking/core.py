@@ -67,7 +67,7 @@ def make_plan(
     tau += [math.inf] * len(known)
     for place, (_, (index, parameter)) in enumerate(known):
         constants[index][parameter] = 2 * d + len(sigma) - len(known) + place
-    witnesses = [t.number for t in tables if _bears_witness(t) and (used is None or t.number in used)]
+    witnesses = [t.number for t in tables if _bears_witness(t)]
     tables = [
         t._replace(
             registers=bool((t.constant >= 0).any()),
