@@ -4,7 +4,8 @@ Simulated: the recordings of `benchmarks.registration` (time offset, range bias 
 coloured azimuths), relative to the radar that is right; and a camera beside a radar, where nothing shows the radar's
 range. Printed: how often each estimate's own 95 % band holds the truth. Real (`--real`): the Autoferry recordings,
 radar and camera, and all four sensors. The time offset is held against the one fitted with truth, in the same way:
-the true paths, seen every second by a sensor of 0.5 m, are the reference there.
+the true paths, seen every second by a sensor of 0.5 m, are the reference there; a target's antenna may lie `extent_m`
+from the point of it that is reported.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from boresight.tracking.run import tracker_for
 from boresight.types import Axes, Component, Recording, Sensor, SensorKind
 
 NEAR, AWAY = 25.0, math.radians(5.0)  # m, rad: reports this close to a true path are taken for its target's
+FOR_GOOD = 1000.0  # s: an antenna stays where it is on its boat
 
 
 def with_camera(seed: int) -> tuple[Recording, dict[str, float]]:
@@ -101,7 +103,9 @@ def with_truth(recording: Recording, settings: TrackerConfig) -> dict[str, tuple
         e = settings.sensors.get(one.id, SensorErrors())
         wander = np.array([e.bias_range, e.bias_azimuth, e.bias_elevation, 0.0, *[e.bias_position] * 3])
         coloured[i] = Coloured(wander, e.bias_time)
-    batch = BatchConfig(settings.q or DEFAULT_Q[2], np.array(PRIOR), coloured, extent=settings.extent or EXTENT)
+    extent = settings.extent or EXTENT
+    coloured[true] = Coloured(np.array([0.0, 0.0, 0.0, 0.0, *[extent] * 3]), FOR_GOOD)
+    batch = BatchConfig(settings.q or DEFAULT_Q[2], np.array(PRIOR), coloured, extent=extent)
     got = estimate(observed, sensors, batch, true, True)
     return {
         sensors[int(got.sensor[k])].id: (float(got.value[k]), math.sqrt(got.covariance[k, k]))
