@@ -70,7 +70,7 @@ def recall(tr: Tracks, sensor: SensorTable, elapsed: float) -> float:
             kept = tr.witness[i, sensor.witness]
             kept[REPORTS] = recalled(kept[REPORTS], sensor.sees_targets, elapsed)
             kept[ELSE] = recalled(kept[ELSE], by_chance, elapsed)
-    return by_chance
+    return float(by_chance)
 
 
 @njit(**LEAF)
