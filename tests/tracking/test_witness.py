@@ -79,6 +79,24 @@ def test_one_bearing_does_not_confirm_all_that_lie_in_its_direction() -> None:
     assert odds(state, 1) == pytest.approx(before * target / none, rel=1e-6)
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_of_several_bearings_the_one_that_others_claim_least_counts(order: int) -> None:
+    """One bearing lies in the direction of two doubtful tracks, another beside it within the gate of one alone."""
+    used = confirming()
+    gained = []
+    for bearings in ([TOWARDS], [TOWARDS, TOWARDS - 0.07][::order]):
+        state = after(used, [[300.0, 400.0], [640.0, 770.0]])
+        tr = state.window.tracks
+        tr.weight[:2], tr.life[:2, 2] = (0.3, 0.0, 0.0, 0.7), 0.0
+        heard, before = tr.heard[:2].copy(), odds(state)
+        state, _ = used.step(state, glance(10.0, bearings))
+        gained.append(odds(state) / before)
+        np.testing.assert_array_equal(
+            state.window.tracks.heard[:2], heard
+        )  # a bearing that only confirms moved nothing
+    assert gained[1] > 1.2 * gained[0]
+
+
 def test_what_an_eye_sees_in_a_direction_counts_once() -> None:
     """Images with a detection as often as there would be one of a target are worth what chance makes improbable."""
     gained = []

@@ -86,7 +86,7 @@ def scan_step(
         k = col_of_row[i]
         bearing = not sensor.ranging and not sensor.joint and tr.heard[i] > 0
         confirms = bearing and not sensor.moves_tracks
-        own = credible(tr, i, sensor, p_d[i])
+        own = bearing and credible(tr, i, sensor, p_d[i])
         found, rival = 1, 0.0
         if confirms:
             view = in_view(tr, i, sensor, p_d[i])

@@ -3,8 +3,9 @@
 A bearing that errs slowly, as camera bearings do, tells of a target once: the next image repeats it. And what a camera
 sees in a direction may be something else that stands there, in every image too. So each track keeps, for each such
 sensor, two probabilities beside its hypotheses: that the sensor reports this target at all, and that, were the track
-none, something else that the sensor reports would stand in its direction. A hundred images with a detection there are
-then worth as much as the chance that there is none, and a hundred without as much as the targets that it passes over.
+none, something else that the sensor reports would stand in its direction. A hundred images with a detection there then
+speak for the track by one over the chance of that other thing, and a hundred without one speak against it by the share
+of targets that the sensor passes over.
 """
 
 from __future__ import annotations
