@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boresight.frames.pose import PoseTrack, add_navigation_noise, sensor_poses
-from boresight.kernels.tracker_looks import Looks, moment, places_of_looks
+from boresight.kernels.tracker_looks import NO_LOOK, Looks, moment, places_of_looks
 from boresight.kernels.tracker_rows import ARRIVAL, PENDING, RowTable, row_table, rows_at_arrival, times_due
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.core import Plan, make_plan
@@ -130,6 +130,10 @@ class Tracker:
     def tick(self, state: TrackerState, t_recv: float) -> Output:
         """Give the rows due by `t_recv` (s) although no look comes in: a stage before the tracker may hold looks."""
         return self._take(state, moment(t_recv))
+
+    def due(self, state: TrackerState, t: float) -> Output:
+        """Give the rows due by time `t` (s), nothing having arrived since: what comes later is the same without."""
+        return self._take(state, moment(t, NO_LOOK))
 
     def finish(self, state: TrackerState) -> tuple[TrackerState, Output]:
         """Give the rows that the last arrival calls for, the decisions and the smoothed rows still in the window."""
