@@ -236,7 +236,12 @@ def sensor_poses(
         track.t_attitude, track.arrived_attitude, track.quaternion, track.steps, limits, t, first, known
     )
     if not needed:  # before the first attitude stamp it does without
-        return good & (turned | (known < track.arrived_attitude[0])), position, velocity, _north_aligned(track, position)
+        return (
+            good & (turned | (known < track.arrived_attitude[0])),
+            position,
+            velocity,
+            _north_aligned(track, position),
+        )
     return good & turned, *_mounted(sensor, track, position, velocity, R, rate)
 
 

@@ -94,6 +94,16 @@ class Tracker:
         """Indices of the sensors in use."""
         return tuple(range(len(self.sensors))) if self.use is None else self.use
 
+    def cannot_begin(self) -> str:
+        """Return in words that no sensor in use can begin a track; empty if one can."""
+        if any(self.sensors[i].begins for i in self.used):
+            return ""
+        names = ", ".join(self.sensors[i].id for i in self.used) or "none"
+        return (
+            f"no sensor in use can begin a track ({names}): one of them has to measure range and azimuth, or a position "
+            "(sigma_range_m with sigma_azimuth_deg, or sigma_position_m, in its [[sensor]])"
+        )
+
     def init(self) -> TrackerState:
         """Return the state before the first look."""
         return TrackerState(empty_window(self.plan))
