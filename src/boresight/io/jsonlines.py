@@ -291,9 +291,7 @@ class LookDecoder:
             if d.latitude_deg is not None or d.longitude_deg is not None:
                 z[i, Component.EAST :] = self._placed(d, sensor)
         if not (np.isfinite(z).any(axis=1)).all() or np.isinf(z).any():
-            raise Refused(
-                "bad_value", "a detection without a measured number (a look that saw nothing: detections = [])"
-            )
+            raise Refused("bad_value", "a detection without a measured number (a look without any has detections = [])")
         far, azimuth, elevation = z[:, Component.RANGE], z[:, Component.AZIMUTH], z[:, Component.ELEVATION]
         if (far < 0.0).any():
             raise Refused("bad_value", f"range_m = {np.nanmin(far):g} is negative")
