@@ -128,7 +128,7 @@ class _Chooser:
             report = self._report(scan, i, float(t[i]), where[i], self.R @ axes[i])
             if report is None:
                 continue
-            far = self._distance(state, scan.sensor, report)
+            far = self.pointer.guide.surprise(state.guide, scan.sensor, *report)
             if best is None or far < least:
                 best, least = report, far
         return best
@@ -136,10 +136,8 @@ class _Chooser:
     def _report(self, scan: Scan, i: int, t: float, origin: FloatArray, turn: FloatArray) -> Report | None:
         z, source = scan.z[i], self.pointer.guide.sources[scan.sensor]
         if source.kind == DIRECTION:
-            if math.isnan(z[Component.AZIMUTH]):
-                return None
-            seen = np.array([z[Component.AZIMUTH], np.nan_to_num(z[Component.ELEVATION]), z[Component.RANGE]])
-            return t, seen, origin, turn
+            seen = z[[Component.AZIMUTH, Component.ELEVATION, Component.RANGE]]
+            return None if np.isnan(seen).all() else (t, seen, origin, turn)
         if math.isnan(z[Component.EAST]):
             return None
         at = origin + turn @ np.nan_to_num(z[POSITION], nan=0.0)
@@ -153,16 +151,3 @@ class _Chooser:
             return t, at, origin, source.axes_of(turn @ C @ turn.T)
         except np.linalg.LinAlgError:
             return None
-
-    def _distance(self, state: PointerState, source: int, report: Report) -> float:
-        """Return how far a report lies from the prediction (rad, or m for positions); 0 before there is one."""
-        t, z, origin, turn = report
-        predicted = self.pointer.guide.predict(state.guide, t)
-        if predicted is None:
-            return 0.0
-        if self.pointer.guide.sources[source].kind != DIRECTION:
-            return float(np.linalg.norm(z - predicted.position))
-        d = turn.T @ (predicted.position - origin)
-        c = math.cos(z[1])
-        u = np.array([c * math.sin(z[0]), c * math.cos(z[0]), math.sin(z[1])])
-        return float(np.arccos(np.clip(u @ d / np.linalg.norm(d), -1.0, 1.0)))
