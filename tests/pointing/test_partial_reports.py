@@ -76,7 +76,10 @@ def test_nothing_measured_changes_nothing() -> None:
 
 def test_an_azimuth_at_the_zenith_says_little_and_breaks_nothing() -> None:
     f = GuideFilter(
-        (GuideSource("gps", sigma_position=30.0), GuideSource("s", sigma_azimuth=1e-3)), orbit=False, q=1e-9, spread=FLAT
+        (GuideSource("gps", sigma_position=30.0), GuideSource("s", sigma_azimuth=1e-3)),
+        orbit=False,
+        q=1e-9,
+        spread=FLAT,
     )
     for east in (0.0, 1e-3, 5.0):
         state = f.init()

@@ -90,7 +90,8 @@ def first_place(
                     best, other, steepest = i, k, steep
     if best < 0:
         return False
-    return _crossing(seen[best], seen[other], t, held, u, v, out)
+    crossed: bool = _crossing(seen[best], seen[other], t, held, u, v, out)
+    return crossed
 
 
 @njit(**PART)

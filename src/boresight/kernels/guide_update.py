@@ -7,6 +7,7 @@ import math
 from numba import njit
 
 from boresight.kernels.guide import (
+    BIAS_TIME,
     DIRECTION,
     EARTH_RATE,
     LONGEST,
@@ -19,6 +20,7 @@ from boresight.kernels.guide import (
     ROW_H,
     ROW_MOTION,
     ROW_R,
+    ROW_ROOM,
     ROW_S,
     ROW_SECOND,
     ROW_THEN,
@@ -137,6 +139,8 @@ def update(
         for i in range(k):
             a = w[ROW_S + i, i] - w[ROW_R + i, i]
             w[ROW_S + i, i] += w[ROW_SECOND, i] * a * a
+    if offsets[BIAS_TIME] > 0.0:
+        _time_by_velocity(P, first + _before(offsets), k, w)
     if lag < 0.0:
         _late(dynamics, q, -lag, k, w)
     share = 0.0
@@ -202,6 +206,38 @@ def _jacobian(biased: bool, m: int, n: int, k: int, first: int, offsets: FloatAr
             for i in range(k):
                 w[ROW_H + i, at] = w[ROW_BIAS + i, j]
             at += 1
+
+
+@njit(**PART)
+def _before(offsets: FloatArray) -> int:
+    """Return how many biases a state holds of a source before the one in time."""
+    n = 0
+    for j in range(BIAS_TIME):
+        if offsets[j] > 0.0:
+            n += 1
+    return n
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def _time_by_velocity(P: FloatArray, b: int, k: int, w: FloatArray) -> None:
+    """Add to S and Y the second order of a time bias (number `b` of the state) times the velocity.
+
+    While both are little known their product is what counts: without it the first reports of a target whose velocity
+    is not known would say how late they are.
+    """
+    for i in range(min(k, 3)):
+        total = 0.0
+        for c in range(3):
+            total += w[ROW_A + i, c] * P[3 + c, b]
+        w[ROW_ROOM, i] = total
+    for i in range(min(k, 3)):
+        w[ROW_Y, i] += w[ROW_ROOM, i]
+        for j in range(min(k, 3)):
+            total = 0.0
+            for c in range(3):
+                for d in range(3):
+                    total += w[ROW_A + i, c] * P[3 + c, 3 + d] * w[ROW_A + j, d]
+            w[ROW_S + i, j] += P[b, b] * total + w[ROW_ROOM, i] * w[ROW_ROOM, j]
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})

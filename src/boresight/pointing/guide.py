@@ -289,7 +289,7 @@ class GuideFilter:
 
 def snapshot(state: GuideState) -> GuideState:
     """Return a copy that later steps do not change."""
-    return GuideState(*(a.copy() for a in state[:-1]), state.work)
+    return GuideState._make(a if a is state.work else a.copy() for a in state)
 
 
 def merged(reports: tuple[Reports, ...]) -> Reports:
