@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from boresight.errors import UserError
 from boresight.frames.tangent import separation
 from boresight.types.sensor import FloatArray
 
 TURN = 2.0 * math.pi
+Mask = tuple[tuple[float, float], ...]  # corners (azimuth, elevation) (rad) of a horizon
 
 
 class MountState(NamedTuple):
@@ -45,7 +46,7 @@ class Mount:
     elevation: tuple[float, float] = (0.0, 0.5 * math.pi)
     azimuth_rate: float = math.radians(10.0)
     elevation_rate: float = math.radians(10.0)
-    mask: tuple[tuple[float, float], ...] = ()
+    mask: Mask = ()
 
     def __post_init__(self) -> None:
         if not (self.azimuth[0] < self.azimuth[1] and self.elevation[0] < self.elevation[1]):
@@ -96,11 +97,7 @@ class Mount:
 
     def visible(self, azimuth: FloatArray, elevation: FloatArray) -> NDArray[np.bool_]:
         """Return (n,) whether directions stand above the horizon mask (linear between its corners) or 0°."""
-        if not self.mask:
-            return np.asarray(elevation) >= 0.0
-        corners = np.array(sorted((a % TURN, e) for a, e in self.mask))
-        horizon = np.interp(np.mod(azimuth, TURN), corners[:, 0], corners[:, 1], period=TURN)
-        return np.asarray(np.asarray(elevation) >= horizon)
+        return np.asarray(np.asarray(elevation) >= horizon_at(self.mask, azimuth))
 
     def plan(self, t: FloatArray, azimuth: FloatArray, elevation: FloatArray) -> PassPlan:
         """Return how to follow directions (n,) (rad) at ascending times: the winding chosen for the whole pass.
@@ -128,6 +125,14 @@ class Mount:
         fast[1:] = np.abs(np.diff(wanted)) > self.azimuth_rate * dt * (1 + 1e-9)
         error = separation(_directions(a, e), _directions(wanted, np.asarray(elevation)))
         return PassPlan(a, e, error, fast, spill[best] < 1e-12)
+
+
+def horizon_at(mask: Mask, azimuth: ArrayLike) -> FloatArray:
+    """Return the elevation (rad) of the horizon at azimuths (rad): linear between the mask's corners, 0 without any."""
+    if not mask:
+        return np.zeros(np.shape(azimuth))
+    corners = np.array(sorted((a % TURN, e) for a, e in mask))
+    return np.asarray(np.interp(np.mod(azimuth, TURN), corners[:, 0], corners[:, 1], period=TURN), dtype=np.float64)
 
 
 def _towards(here: float, there: float, most: float) -> float:
