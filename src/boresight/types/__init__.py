@@ -1,6 +1,6 @@
 """The few types that everything else is made of."""
 
-from boresight.types.enums import N_COMPONENTS, Axes, Component, Fate, SensorKind, TrackStatus
+from boresight.types.enums import N_COMPONENTS, Axes, Component, Fate, Reporting, SensorKind, TrackStatus
 from boresight.types.recording import Detections, Ignore, PlatformTrack, Recording, Truth
 from boresight.types.results import (
     FATES,
@@ -35,6 +35,7 @@ __all__ = [
     "Pose",
     "Recording",
     "RegistrationRows",
+    "Reporting",
     "Results",
     "Scan",
     "Sensor",
