@@ -114,6 +114,7 @@ def move(tr: Tracks, i: int, to: int, models: Models | None) -> None:
     put3(tr.anchor_P, to, tr.anchor_P, i, 1)
     put3(tr.told, to, tr.told, i, 1)
     put3(tr.witness, to, tr.witness, i, 1)
+    put3(tr.spoken, to, tr.spoken, i, 1)
     if models is not None:
         put_models(tr, to, tr, i, 1)
 

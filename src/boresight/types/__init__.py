@@ -12,7 +12,7 @@ from boresight.types.results import (
     TrackRows,
     no_tracks,
 )
-from boresight.types.scan import Scan
+from boresight.types.scan import Scan, address_code, addresses_of
 from boresight.types.sensor import Coverage, FloatArray, Mount, Sensor, Site
 from boresight.types.state import GaussianState, Pose, UpdateInfo
 
@@ -45,5 +45,7 @@ __all__ = [
     "TrackStatus",
     "Truth",
     "UpdateInfo",
+    "address_code",
+    "addresses_of",
     "no_tracks",
 ]
