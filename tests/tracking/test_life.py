@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from boresight.frames.pose import pose_track
-from boresight.kernels.tracker import AZIMUTH_BINS, HIDDEN, NOTHING, STATIC, VISIBLE
+from boresight.kernels.tracker import AZIMUTH_BINS, NOTHING, STATIC, VISIBLE
 from boresight.kernels.tracker_end import end_and_merge
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.tracking.tracker import Tracker, TrackerState

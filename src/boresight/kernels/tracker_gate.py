@@ -12,7 +12,7 @@ from boresight.kernels.options import LEAF, PART
 from boresight.kernels.registration import TIME
 from boresight.kernels.tracker import GATED, UNASSOCIATED, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_clutter import log_densities
-from boresight.kernels.tracker_messages import address_evidence, find_owned
+from boresight.kernels.tracker_messages import find_owned, with_address
 from boresight.kernels.tracker_place import Places, fix_sensitivity
 from boresight.kernels.tracker_state import components, existence, innovation, linearise, log_determinant
 from boresight.kernels.tracker_workroom import Workroom
@@ -161,7 +161,7 @@ def gate_all(
                 log_hit, log_miss = math.log(there * p_d[i]), math.log(1.0 - there * p_d[i])
             loglik[used] = -0.5 * (nis + log_determinant(c, room) + c * LOG_2PI) - log_density[k]
             if sensor.spoken >= 0:
-                loglik[used] += address_evidence(tr, i, sensor, look.address[k], owned[k])
+                loglik[used] = with_address(tr, i, sensor, look.address[k], owned[k], loglik[used], nis, p_d[i])
             cost[used] = log_miss - (log_hit + loglik[used])
             used += 1
     start[n_tracks] = used

@@ -30,11 +30,13 @@ from boresight.kernels.tracker import (
 from boresight.types.sensor import FloatArray
 
 SELDOM = 0.01  # share of the messages that are one target's where nothing is known of its interval
-LONGEST, SILENCE = 4.0, 100.0  # times the mean: a gap between messages of one target, of all, counts for no more
+LONGEST = 4.0  # times the mean: a gap between two messages of a target counts for no more
+SILENCE = 3.0  # times a target's interval: after as long without any message the sensor was silent, not the targets
 OWN_RATE, SENSOR_RATE = 0.2, 0.05  # share that the newest interval has in a mean
 FORGET = 0.99  # what remains of the messages before with each new one: their mean is over some hundred
+OTHER = 0.1  # odds that a message near a target is another's, where its address says so
 MORE_ADDRESSES = 10.0  # addresses that there may be beside those of the tracks
-MOST_VOTES = 20.0
+MOST_VOTES, ESTABLISHED = 20.0, 3.0
 
 
 @njit(**LEAF)
@@ -50,8 +52,9 @@ def note_pace(tr: Tracks, sensor: SensorTable, elapsed: float, count: int) -> No
     """Learn how often such a sensor reports: `count` detections, `elapsed` (s) after those before."""
     if sensor.single and count > 0 and elapsed < math.inf:
         pace = tr.pace[sensor.number]
-        if pace[SPACING] > 0.0:
-            elapsed = min(elapsed, SILENCE * pace[SPACING])
+        interval = sensor.interval if sensor.interval > 0.0 else pace[EVERY]
+        if pace[SPACING] > 0.0 and 0.0 < SILENCE * interval < elapsed:
+            elapsed = count * pace[SPACING]
         pace[PASSED] = FORGET * pace[PASSED] + elapsed
         pace[MESSAGES] = FORGET * pace[MESSAGES] + count
         pace[SPACING] = pace[PASSED] / pace[MESSAGES]  # many may bear the same stamp
@@ -105,17 +108,43 @@ def find_owned(tr: Tracks, sensor: SensorTable, look: Look, owned: FloatArray) -
 
 
 @njit(**LEAF)
-def address_evidence(tr: Tracks, i: int, sensor: SensorTable, address: int, owned: float) -> float:
-    """Log-likelihood of an address if the detection is of track `i`, over that if it is of nothing: any there may be.
+def with_address(
+    tr: Tracks, i: int, sensor: SensorTable, address: int, owned: float, log_ratio: float, nis: float, p_d: float
+) -> float:
+    """Return the log-likelihood ratio of a detection for track `i`, over nothing, with what its address says.
 
-    `owned` is 1 where a track has that address.
+    `log_ratio` is that without it, `nis` its distance, `p_d` the probability of a detection; `owned` is 1 where a track
+    has that address. An address that is not the track's own is a wrong one, or another target's, which may be as near:
+    what stands against it is then not clutter alone.
     """
     if address == NO_ADDRESS:
-        return 0.0
+        return log_ratio
     own = tr.spoken[i, sensor.spoken, ADDRESS]
     if own == address:
-        return math.log((1.0 - sensor.wrong_id) * (tr.live[0] + MORE_ADDRESSES))
-    return math.log(sensor.wrong_id) if own != NO_ADDRESS or owned > 0.0 else 0.0
+        return log_ratio + math.log((1.0 - sensor.wrong_id) * (tr.live[0] + MORE_ADDRESSES))
+    if own == NO_ADDRESS:
+        return log_ratio + (math.log(sensor.wrong_id) if owned > 0.0 else 0.0)
+    return log_ratio + min(math.log(sensor.wrong_id), math.log(sensor.wrong_id / (OTHER * p_d)) - 0.5 * nis - log_ratio)
+
+
+@njit(**LEAF)
+def are_two(tr: Tracks, i: int, j: int) -> bool:
+    """Whether two tracks that both have messages have addresses that differ."""
+    for a in range(tr.spoken.shape[1]):
+        one, other = tr.spoken[i, a], tr.spoken[j, a]
+        established = one[VOTES] >= ESTABLISHED and other[VOTES] >= ESTABLISHED and one[ADDRESS] != other[ADDRESS]
+        if established and abs(one[LAST] - other[LAST]) < SILENCE * max(one[INTERVAL], other[INTERVAL]):
+            return True
+    return False
+
+
+@njit(**LEAF)
+def take_over(tr: Tracks, i: int, weaker: int) -> None:
+    """Let track `i`, with which another has become one, have the address that was heard last."""
+    for a in range(tr.spoken.shape[1]):
+        if tr.spoken[weaker, a, LAST] > tr.spoken[i, a, LAST]:
+            for b in range(tr.spoken.shape[2]):
+                tr.spoken[i, a, b] = tr.spoken[weaker, a, b]
 
 
 @njit(**LEAF)
