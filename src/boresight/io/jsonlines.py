@@ -23,6 +23,7 @@ from boresight.io.declaration import DEG, SIGMA_KEYS
 from boresight.io.detections import ENU_FROM_FRD, FRD_ORDER, UNITS, is_frd
 from boresight.kernels.geodesy import ecef_from_geodetic
 from boresight.types import N_COMPONENTS, Axes, Component, FloatArray, Scan, Sensor, Site
+from boresight.types.scan import address_code
 
 LONGEST = 1 << 18  # bytes of one line; longer ones are counted and left out
 LONGEST_SILENCE = 86_400.0  # s between two arrivals that lines give themselves
@@ -281,7 +282,9 @@ class LookDecoder:
                 return None
             z, t, R, rows = z[keep], t[keep], R[keep], rows[keep]
         middle = 0.5 * (float(t.min()) + float(t.max()))
-        return Scan(sensor, middle, arrival, t, z, R, rows)
+        names = [found[i].source_id for i in (rows - first)]
+        codes = None if not any(names) else np.array([address_code(name) for name in names], np.int64)
+        return Scan(sensor, middle, arrival, t, z, R, rows, (), codes)
 
     def _values(self, found: Sequence[Measured], sensor: Sensor) -> FloatArray:
         z = np.array([[
