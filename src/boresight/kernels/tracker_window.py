@@ -93,7 +93,7 @@ def advance(
         while at > 0 and looks.t[order[at - 1]] > t:
             at -= 1
         due = clock.now[PENDING] != 0.0 and t_recv > clock.now[ARRIVAL]
-        if not _has_room(tr, copies, looks, queue, k, at, times_due(clock, period, t_recv) if due else 0, rows):
+        if not _has_room(tr, copies, looks, queue, k, at, times_due(tr, s, clock, period, t_recv) if due else 0, rows):
             return k
         if due:
             rows_at_arrival(tr, s, clock, period, coast_after, rows, models)
