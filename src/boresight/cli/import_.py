@@ -7,6 +7,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
+from boresight.cli.output import print_notes
 from boresight.io.files import RECORDING, check_output
 from boresight.io.recording import write_recording
 from boresight.types import Recording
@@ -80,5 +81,7 @@ def csv(
 
 def _finish(recording: Recording, output: Path, force: bool, extras: dict[str, str] | None = None) -> None:
     write_recording(recording, output, force, extras)
+    print_notes(recording.notes)
     n, twins = len(recording.detections), int(recording.duplicates.sum())
-    print(f"wrote {output}: {n} rows of {len(recording.sensors)} sensors ({twins} duplicates)")
+    refused = f", {len(recording.refused)} refused" if recording.refused else ""
+    print(f"wrote {output}: {n} rows of {len(recording.sensors)} sensors ({twins} duplicates{refused})")

@@ -16,13 +16,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from boresight._version import __version__
-from boresight.cli.output import print_json
+from boresight.cli.output import print_json, print_notes
 from boresight.config.tracker import parameters_of, read_configuration
 from boresight.errors import UserError
 from boresight.io.files import check_output, output_folder
 from boresight.io.recording import read_recording
 from boresight.io.results import write_results
 from boresight.io.scans import iter_scans, selected
+from boresight.metrics.losses import loss_lines, losses
 from boresight.tracking.config import TrackerConfig
 from boresight.types import FATES, DecisionRows, Recording, Results, Scan
 
@@ -70,6 +71,7 @@ def track(
     """
     check_output(output, force, inputs=[rec, config])
     recording = read_recording(rec)
+    print_notes(recording.notes)
     ids = sensor_ids(recording, sensors)
     source = config if config is not None else (rec / BESIDE if (rec / BESIDE).is_file() else None)
     known = [s.id for s in recording.sensors]
@@ -92,6 +94,7 @@ def track(
             from boresight.report.html import write_report
 
             write_report(folder / "report.html", results, recording)
+    print_notes(loss_lines(recording, results.decisions))
     counts = results.summary["counts"]
     row = {"output": str(output), **counts, "seconds": results.summary["seconds"]}
     if json:
@@ -167,8 +170,10 @@ def track_recording(
             "fates": _fates(fates),
         },
         "seconds": seconds,
-        "t_first_s": float(recording.detections.t.min()),
-        "t_last_s": float(recording.detections.t.max()),
+        "lost": losses(recording, fates),
+        "notes": list(recording.notes),
+        "t_first_s": recording.span[0],
+        "t_last_s": recording.span[1],
         "window_s": tracker.length,
         "parameters": parameters_of(config) | ({"pipeline": pipeline_of(stages)} if stages else {}),
         "versions": versions(),

@@ -135,6 +135,9 @@ def decision_rows(recording: Recording, tracker: Tracker, decisions: Sequence[De
     duplicate = recording.duplicates & used
     fate[duplicate] = code[Fate.DUPLICATE]
     reason[duplicate] = "the same row stands earlier"
+    for k, why in recording.refused.items():
+        if used[k]:
+            fate[k], reason[k] = code[Fate.SCREENED], why
     birth = np.full(n, -1, np.int64)
     nis = np.full(n, np.nan)
     if decisions:
