@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from boresight.io import limits
 from boresight.io.declaration import DEG, SIGMA_KEYS
 from boresight.io.stamps import examine
 from boresight.io.table import LIST, NUMBER, TEXT, WHOLE, Table, nullable
-from boresight.types import N_COMPONENTS, Axes, Component, Detections, FloatArray, Sensor
+from boresight.types import N_COMPONENTS, Axes, Component, Detections, FloatArray, Recording, Sensor
 
 POLAR = ("range_m", "azimuth_deg", "elevation_deg", "range_rate_m_s")
 CARTESIAN = ("x_m", "y_m", "z_m")
@@ -188,6 +189,25 @@ def find_duplicates(detections: Detections) -> NDArray[np.bool_]:
         if twins[row] and (other is None or not np.array_equal(other, detections.covariance[row], equal_nan=True)):
             twins[row] = False
     return twins
+
+
+def in_order(detections: Detections, order: NDArray[np.int64]) -> Detections:
+    """Return the rows in another order (n,)."""
+    place = {int(row): i for i, row in enumerate(order)}
+    parts = {name: getattr(detections, name)[order] for name in ("t", "t_recv", "sensor", "scan", "z", "sigma")}
+    texts = [detections.source_id, detections.attributes]
+    source, attributes = (None if one is None else [one[i] for i in order.tolist()] for one in texts)
+    covariance = {place[row]: full for row, full in detections.covariance.items()}
+    return Detections(**parts, covariance=covariance, source_id=source, attributes=attributes)
+
+
+def reordered(recording: Recording) -> Recording:
+    """Return a recording whose detections stand in order of arrival."""
+    order = np.argsort(recording.detections.t_recv, kind="stable")
+    place = {int(row): i for i, row in enumerate(order)}
+    refused = {place[row]: why for row, why in recording.refused.items()}
+    rows = in_order(recording.detections, order)
+    return replace(recording, detections=rows, duplicates=find_duplicates(rows), refused=dict(sorted(refused.items())))
 
 
 def columns_of(detections: Detections, sensors: tuple[Sensor, ...]) -> dict[str, Any]:

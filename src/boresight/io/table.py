@@ -30,6 +30,7 @@ class Table:
     data: pa.Table
     csv_lines: bool = False
     notes: list[str] = field(default_factory=list)  # what a reader of the table is to know
+    origin: list[tuple[Path, int]] | None = None  # file and line of each row, where they are not in order
 
     def __len__(self) -> int:
         return int(self.data.num_rows)
@@ -39,10 +40,13 @@ class Table:
 
     def fail(self, row: int | None, text: str) -> NoReturn:
         """Raise UserError for a row (counted from 0; of a CSV: its line) or for the whole file."""
-        raise UserError(f"{self.path}:{'' if row is None else f' {self.place(row)}:'} {text}")
+        path = self.origin[row][0] if self.origin is not None and row is not None else self.path
+        raise UserError(f"{path}:{'' if row is None else f' {self.place(row)}:'} {text}")
 
     def place(self, row: int) -> str:
         """Return a row (counted from 0) in words: of a CSV its line."""
+        if self.origin is not None:
+            return f"line {self.origin[row][1]}"
         return f"line {row + 2}" if self.csv_lines else f"row {row}"
 
     def fail_where(self, bad: NDArray[np.bool_], text: str, values: Any = None) -> None:
