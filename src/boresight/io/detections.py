@@ -14,7 +14,7 @@ from boresight.errors import did_you_mean
 from boresight.io import limits
 from boresight.io.declaration import DEG, SIGMA_KEYS
 from boresight.io.stamps import examine
-from boresight.io.table import LIST, NUMBER, TEXT, WHOLE, Table, nullable
+from boresight.io.table import LIST, NUMBER, TEXT, WHOLE, Table, in_unit, nullable
 from boresight.types import N_COMPONENTS, Axes, Component, Detections, FloatArray, Recording, Sensor
 
 POLAR = ("range_m", "azimuth_deg", "elevation_deg", "range_rate_m_s")
@@ -36,13 +36,13 @@ UNITS = np.array([1.0, DEG, DEG, 1.0, 1.0, 1.0, 1.0])
 SIGMA_KEY_OF = {component: key for key, (components, _) in SIGMA_KEYS.items() for component in components}
 
 # forward, right, down (as filed for body and mount axes) to the east/north/up-like columns: right, forward, -down
-_ENU_FROM_FRD = np.eye(N_COMPONENTS)
-_ENU_FROM_FRD[4:, 4:] = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
+ENU_FROM_FRD = np.eye(N_COMPONENTS)
+ENU_FROM_FRD[4:, 4:] = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
 
-_FRD_ORDER = [0, 1, 2, 3, 5, 4, 6]
+FRD_ORDER = [0, 1, 2, 3, 5, 4, 6]
 
 
-def _is_frd(sensor: Sensor) -> bool:
+def is_frd(sensor: Sensor) -> bool:
     return sensor.axes in (Axes.BODY, Axes.MOUNT)
 
 
@@ -125,7 +125,7 @@ def _sigmas(table: Table, sensors: tuple[Sensor, ...], sensor: NDArray[np.int64]
 
 def _turned(z: FloatArray, sensors: tuple[Sensor, ...], sensor: NDArray[np.int64]) -> FloatArray:
     """Forward/right/down to the east/north/up-like columns, and back: the turn is its own inverse."""
-    frd = np.array([_is_frd(s) for s in sensors])[sensor]
+    frd = np.array([is_frd(s) for s in sensors])[sensor]
     z[frd, 4:] = z[frd][:, [5, 4, 6]] * [1.0, 1.0, -1.0]
     return z
 
@@ -138,8 +138,8 @@ def _covariances(
     for row, upper in enumerate(table.objects("covariance") or ()):
         if upper is None:
             continue
-        frd = _is_frd(sensors[sensor[row]])
-        filed = z[row, _FRD_ORDER] if frd else z[row]
+        frd = is_frd(sensors[sensor[row]])
+        filed = z[row, FRD_ORDER] if frd else z[row]
         index = np.flatnonzero(~np.isnan(filed))
         m = len(index)
         if len(upper) != m * (m + 1) // 2:
@@ -154,7 +154,7 @@ def _covariances(
         full = np.zeros((N_COMPONENTS, N_COMPONENTS))
         full[np.ix_(index, index)] = block
         if frd:
-            full = _ENU_FROM_FRD @ full @ _ENU_FROM_FRD.T
+            full = ENU_FROM_FRD @ full @ ENU_FROM_FRD.T
         missing = np.isnan(z[row])
         full[missing] = np.nan
         full[:, missing] = np.nan
@@ -220,7 +220,7 @@ def columns_of(detections: Detections, sensors: tuple[Sensor, ...]) -> dict[str,
         "sensor": pa.array(ids[sensor], pa.string()),
         "scan": detections.scan,
     }
-    z = _turned(detections.z.copy(), sensors, sensor) / UNITS
+    z = in_unit(_turned(detections.z.copy(), sensors, sensor), UNITS)
     for i, name in enumerate(MEASURED):
         if not np.isnan(z[:, i]).all() or name == "range_m":
             out[name] = nullable(z[:, i])
@@ -234,7 +234,7 @@ def columns_of(detections: Detections, sensors: tuple[Sensor, ...]) -> dict[str,
             first = np.where(np.isnan(first), other, first)
         first = np.where((first == declared[:, components[0]]) | full, np.nan, first)
         if not np.isnan(first).all():
-            out[key] = nullable(first / unit)
+            out[key] = nullable(in_unit(first, unit))
     if detections.covariance:
         out["covariance"] = pa.array(_upper(detections, sensors), pa.list_(pa.float64()))
     for name in ("source_id", "attributes"):
@@ -248,9 +248,9 @@ def _upper(detections: Detections, sensors: tuple[Sensor, ...]) -> list[list[flo
     for row, full in detections.covariance.items():
         known = ~np.isnan(np.diag(full))
         filed = np.nan_to_num(full)
-        if _is_frd(sensors[detections.sensor[row]]):
-            filed = _ENU_FROM_FRD.T @ filed @ _ENU_FROM_FRD
-            known = known[_FRD_ORDER]
+        if is_frd(sensors[detections.sensor[row]]):
+            filed = ENU_FROM_FRD.T @ filed @ ENU_FROM_FRD
+            known = known[FRD_ORDER]
         block = filed[np.ix_(known, known)]
         out[row] = [float(v) for v in block[np.triu_indices(len(block))]]
     return out

@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boresight.io.declaration import DEG
-from boresight.io.table import NUMBER, TEXT, Table, nullable
-from boresight.types import FloatArray, Ignore, PlatformTrack, Site, Truth
+from boresight.io.table import NUMBER, TEXT, Table, in_unit, nullable
+from boresight.types import ENU, VELOCITY, FloatArray, Ignore, PlatformTrack, Site, Truth
 
-ENU = ("east_m", "north_m", "up_m")
 GEODETIC = ("latitude_deg", "longitude_deg", "height_m")
-VELOCITY = ("ve_m_s", "vn_m_s", "vu_m_s")
 YPR = ("yaw_deg", "pitch_deg", "roll_deg")
 PLATFORM_SCHEMA: dict[str, str] = {
     "t_s": NUMBER,
+    "t_recv_s": NUMBER,
     "platform": TEXT,
     **dict.fromkeys((*GEODETIC, *ENU, *YPR, *VELOCITY, "sigma_position_m", "sigma_attitude_deg"), NUMBER),
 }
@@ -36,6 +35,7 @@ def platforms_of(table: Table, site: Site, dimensions: int) -> tuple[PlatformTra
     ypr = _columns(table, YPR) * DEG
     sigma = table.checked("sigma_position_m")
     turn = table.checked("sigma_attitude_deg") * DEG
+    arrived = table.numbers("t_recv_s")
     for name, values in (("sigma_position_m", sigma), ("sigma_attitude_deg", turn)):
         table.fail_where(values <= 0, f"{name} is not above zero; leave it null when not known")
     known = np.asarray(np.isfinite(position).all(axis=1))  # without a position the rest of a row is of no use
@@ -46,7 +46,11 @@ def platforms_of(table: Table, site: Site, dimensions: int) -> tuple[PlatformTra
             table.fail(None, f"no row of platform '{name}' has a position")
         if np.isnan(ypr[rows, 1:]).all():  # a heading alone: the platform is taken as level
             ypr[rows, 1:] = np.where(np.isnan(ypr[rows, :1]), np.nan, 0.0)
-        out.append(PlatformTrack(name, t, position[rows], velocity[rows], ypr[rows], sigma[rows], turn[rows]))
+        columns = (position[rows], velocity[rows], ypr[rows], sigma[rows], turn[rows])
+        came = arrived[rows]
+        out.append(
+            PlatformTrack(name, t, *columns, None if np.isnan(came).all() else np.where(np.isnan(came), t, came))
+        )
     return tuple(out)
 
 
@@ -125,11 +129,13 @@ def platform_columns(platforms: Sequence[PlatformTrack]) -> dict[str, Any]:
         "t_s": np.concatenate([p.t for p in platforms]),
         "platform": [p.id for p in platforms for _ in p.t],
     }
+    if any(p.t_recv is not None for p in platforms):
+        out["t_recv_s"] = np.concatenate([p.t if p.t_recv is None else p.t_recv for p in platforms])
     out |= _split(ENU, np.concatenate([p.position for p in platforms]), always=True)
-    out |= _split(YPR, np.concatenate([p.ypr for p in platforms]) / DEG)
+    out |= _split(YPR, in_unit(np.concatenate([p.ypr for p in platforms]), DEG))
     out |= _split(VELOCITY, np.concatenate([p.velocity for p in platforms]))
     out |= _split(("sigma_position_m",), np.concatenate([p.sigma_position for p in platforms])[:, None])
-    out |= _split(("sigma_attitude_deg",), np.concatenate([p.sigma_attitude for p in platforms])[:, None] / DEG)
+    out |= _split(("sigma_attitude_deg",), in_unit(np.concatenate([p.sigma_attitude for p in platforms])[:, None], DEG))
     return out
 
 

@@ -234,3 +234,12 @@ def write_table(path: Path, columns: Mapping[str, Any]) -> None:
     """Write columns as one Parquet file."""
     arrays = {k: v if isinstance(v, pa.Array | pa.ChunkedArray) else pa.array(v) for k, v in columns.items()}
     pq.write_table(pa.table(arrays), path, compression="zstd")
+
+
+def in_unit(values: FloatArray, unit: float | FloatArray) -> FloatArray:
+    """Return SI values in a unit (SI per unit) such that multiplying by it again gives the same bits where any do."""
+    out: FloatArray = values / unit
+    for toward in (np.inf, -np.inf):
+        near = np.nextafter(out, toward)
+        out = np.where((out * unit != values) & (near * unit == values), near, out)
+    return out

@@ -15,8 +15,9 @@ from boresight.kernels.tracker import AZIMUTH_BINS, Extras, IntArray, Models, Se
 from boresight.kernels.tracker_copies import WHOLE, Copies, each_of, no_copies
 from boresight.kernels.tracker_looks import columns_of
 from boresight.tracking.config import SensorErrors, TrackerConfig
-from boresight.types import N_COMPONENTS, Component, FloatArray, Sensor, SensorKind
+from boresight.types import N_COMPONENTS, Component, FloatArray, Sensor
 
+MOST_SENSORS = 62  # bits of what each track was seen by
 _BIASED = {
     Component.RANGE: "bias_range",
     Component.AZIMUTH: "bias_azimuth",
@@ -45,6 +46,12 @@ def make_plan(
     """Pack a configuration for `sensors` in `dimensions` (2 or 3); biases are planned for those in `used` (all)."""
     d = dimensions
     flat = d == 2
+    taking = range(len(sensors)) if used is None else used
+    if len({i % MOST_SENSORS for i in taking}) < len(taking):
+        raise UserError(
+            f"{len(sensors)} sensors: the tracker tells at most {MOST_SENSORS} apart; use fewer (--sensors), the ones in "
+            f"use within {MOST_SENSORS} of each other"
+        )
     sigma: list[float] = []
     tau: list[float] = []
     tables = []
@@ -110,7 +117,7 @@ def _table(
         azimuth_span=min(span, 2.0 * math.pi),
         elevation_low=c.elevation[0],
         elevation_high=c.elevation[1],
-        ranging=sensor.kind not in (SensorKind.INFRARED, SensorKind.OPTICAL),
+        ranging=sensor.ranging,
         bias=bias,
         registers=False,
         constant=constant,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boresight.frames.pose import PoseTrack, add_navigation_noise, sensor_poses
-from boresight.kernels.tracker_looks import Looks, moment, places_of_looks
+from boresight.kernels.tracker_looks import NO_LOOK, Looks, moment, places_of_looks
 from boresight.kernels.tracker_rows import ARRIVAL, PENDING, RowTable, row_table, rows_at_arrival, times_due
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.core import Plan, make_plan
@@ -94,6 +94,16 @@ class Tracker:
         """Indices of the sensors in use."""
         return tuple(range(len(self.sensors))) if self.use is None else self.use
 
+    def cannot_begin(self) -> str:
+        """Return in words that no sensor in use can begin a track; empty if one can."""
+        if any(self.sensors[i].begins for i in self.used):
+            return ""
+        names = ", ".join(self.sensors[i].id for i in self.used) or "none"
+        return (
+            f"no sensor in use can begin a track ({names}): one of them has to measure range and azimuth, or a position "
+            "(sigma_range_m with sigma_azimuth_deg, or sigma_position_m, in its [[sensor]])"
+        )
+
     def init(self) -> TrackerState:
         """Return the state before the first look."""
         return TrackerState(empty_window(self.plan))
@@ -130,6 +140,10 @@ class Tracker:
     def tick(self, state: TrackerState, t_recv: float) -> Output:
         """Give the rows due by `t_recv` (s) although no look comes in: a stage before the tracker may hold looks."""
         return self._take(state, moment(t_recv))
+
+    def due(self, state: TrackerState, t: float) -> Output:
+        """Give the rows due by time `t` (s), nothing having arrived since: what comes later is the same without."""
+        return self._take(state, moment(t, NO_LOOK))
 
     def finish(self, state: TrackerState) -> tuple[TrackerState, Output]:
         """Give the rows that the last arrival calls for, the decisions and the smoothed rows still in the window."""

@@ -3,9 +3,12 @@
 from boresight.types.enums import N_COMPONENTS, Axes, Component, Fate, SensorKind, TrackStatus
 from boresight.types.recording import Detections, Ignore, PlatformTrack, Recording, Truth
 from boresight.types.results import (
+    COVARIANCE,
+    ENU,
     FATES,
     NO_TRACK,
     STATUSES,
+    VELOCITY,
     DecisionRows,
     RegistrationRows,
     Results,
@@ -17,10 +20,13 @@ from boresight.types.sensor import Coverage, FloatArray, Mount, Sensor, Site
 from boresight.types.state import GaussianState, Pose, UpdateInfo
 
 __all__ = [
+    "COVARIANCE",
+    "ENU",
     "FATES",
     "NO_TRACK",
     "N_COMPONENTS",
     "STATUSES",
+    "VELOCITY",
     "Axes",
     "Component",
     "Coverage",

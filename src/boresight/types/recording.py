@@ -44,6 +44,7 @@ class PlatformTrack:
     ypr: FloatArray  # (n, 3) rad
     sigma_position: FloatArray  # (n,) m
     sigma_attitude: FloatArray  # (n,) rad
+    t_recv: FloatArray | None = None  # (n,) s, when each arrived; None: with its stamp
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from boresight.types.enums import N_COMPONENTS, Axes, SensorKind
+from boresight.types.enums import N_COMPONENTS, Axes, Component, SensorKind
 
 FloatArray = NDArray[np.float64]
 
@@ -69,3 +69,21 @@ class Sensor:
     p_detection: float = 0.9
     clutter_per_scan: float = 1.0
     coverage: Coverage = Coverage()
+
+    @property
+    def ranging(self) -> bool:
+        """Whether it measures where things are, and not only in which direction: by its sigmas, not by its kind.
+
+        A sensor that declares no sigma at all (its rows bring theirs) goes by its kind.
+        """
+        if np.isnan(self.sigma).all():
+            return self.kind not in (SensorKind.INFRARED, SensorKind.OPTICAL)
+        return bool(np.isfinite(self.sigma[[Component.RANGE, Component.EAST]]).any())
+
+    @property
+    def begins(self) -> bool:
+        """Whether one detection of it can begin a track: range and azimuth, or east and north."""
+        if np.isnan(self.sigma).all():
+            return self.ranging
+        polar = self.sigma[[Component.RANGE, Component.AZIMUTH]]
+        return bool(np.isfinite(polar).all() or np.isfinite(self.sigma[[Component.EAST, Component.NORTH]]).all())
