@@ -55,7 +55,7 @@ def look_at(points: np.ndarray) -> Look:
     R[:, 4, 4] = R[:, 5, 5] = 4.0
     R[:, 4, 5] = R[:, 5, 4] = 0.0
     zero = np.zeros((m + 1, 3))
-    return Look(0.0, np.zeros(m), z, R, np.arange(m), zero, zero, np.tile(EYE, (m + 1, 1, 1)))
+    return Look(0.0, np.zeros(m), z, R, np.arange(m), np.full(m, -1), zero, zero, np.tile(EYE, (m + 1, 1, 1)))
 
 
 def plan_of(**errors: float) -> Plan:

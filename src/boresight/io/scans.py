@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boresight.errors import UserError, did_you_mean
-from boresight.types import Detections, FloatArray, Recording, Scan
+from boresight.types import Detections, FloatArray, Recording, Scan, address_code
 
 
 def iter_scans(recording: Recording, sensors: Sequence[str] | None = None) -> Iterator[Scan]:
@@ -51,6 +51,7 @@ def _starts(d: Detections, rows: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _cut(d: Detections, rows: NDArray[np.int64], starts: NDArray[np.int64]) -> Iterator[Scan]:
     z, t, covariance = d.z[rows], d.t[rows], covariances(d, rows)
+    address = addresses(d, rows)
     empty: NDArray[np.bool_] = np.all(np.isnan(z), axis=1)
     first = starts[:-1]
     n_empty = np.add.reduceat(empty.astype(np.int64), first)
@@ -67,7 +68,15 @@ def _cut(d: Detections, rows: NDArray[np.int64], starts: NDArray[np.int64]) -> I
             here = empty[begin:end]
             empty_rows = tuple(rows[begin:end][here].tolist())
             part = begin + np.flatnonzero(~here)
-        yield Scan(sensor, t_look, t_recv, t[part], z[part], covariance[part], rows[part], empty_rows)
+        own = None if address is None else address[part]
+        yield Scan(sensor, t_look, t_recv, t[part], z[part], covariance[part], rows[part], empty_rows, own)
+
+
+def addresses(d: Detections, rows: NDArray[np.int64]) -> NDArray[np.int64] | None:
+    """Return the codes of the given rows' `source_id`, -1 where they have none; None where no row has one."""
+    if d.source_id is None:
+        return None
+    return np.array([address_code(d.source_id[row]) for row in rows.tolist()], np.int64)
 
 
 def covariances(d: Detections, rows: NDArray[np.int64]) -> FloatArray:

@@ -199,12 +199,15 @@ def add_rows(
     for i in range(tr.live[0]):
         if not (tr.life[i, 2] > 0.0 and survive * (tr.weight[i, VISIBLE] + tr.weight[i, HIDDEN]) >= s.hide_below):
             continue
+        unheard = t - tr.life[i, 1]
+        if unheard > s.hide_after:
+            continue
         if models is not None:
             q3 = expected_noise(tr, i, s, models, dt) * dt**3 / 3.0
         rows.t[used] = t
         rows.t_known[used] = t_known
         rows.birth[used] = tr.birth[i]
-        rows.coasting[used] = tr.time[0] - tr.life[i, 1] > coast_after
+        rows.coasting[used] = unheard > coast_after
         for a in range(d):
             rows.position[used, a] = tr.x[i, a] + dt * tr.x[i, d + a]
             rows.velocity[used, a] = tr.x[i, d + a]

@@ -15,9 +15,11 @@ from boresight.kernels.tracker import AZIMUTH_BINS, Extras, IntArray, Models, Se
 from boresight.kernels.tracker_copies import WHOLE, Copies, each_of, no_copies
 from boresight.kernels.tracker_looks import columns_of
 from boresight.tracking.config import SensorErrors, TrackerConfig
-from boresight.types import N_COMPONENTS, Component, FloatArray, Sensor
+from boresight.types import N_COMPONENTS, Component, FloatArray, Reporting, Sensor
 
 MOST_SENSORS = 62  # bits of what each track was seen by
+START_SHARE = 0.25  # of the prior speed: with that, what stood sets off where nothing is said
+WRONG_ID = 0.02  # probability that an address is not the target's own, where nothing is said
 _BIASED = {
     Component.RANGE: "bias_range",
     Component.AZIMUTH: "bias_azimuth",
@@ -75,8 +77,10 @@ def make_plan(
     for place, (_, (index, parameter)) in enumerate(known):
         constants[index][parameter] = 2 * d + len(sigma) - len(known) + place
     witnesses = [t.number for t in tables if _bears_witness(t)]
+    spoken = [t.number for t in tables if t.single or t.wrong_id > 0.0]
     tables = [
         t._replace(
+            spoken=spoken.index(t.number) if t.number in spoken else -1,
             registers=bool((t.constant >= 0).any()),
             witness=witnesses.index(t.number) if t.number in witnesses else -1,
         )
@@ -89,7 +93,7 @@ def make_plan(
     n = 2 * d + len(sigma)
     extras = bool(known or config.blob_share > 0.0 or any(t.joint for t in tables)) or None
     models = _models(config, settings.q)
-    empty = _before_all(settings, tables, n, len(witnesses), models is not None)
+    empty = _before_all(settings, tables, n, len(witnesses), len(spoken), models is not None)
     return Plan(settings, tuple(tables), n, columns_of(tuple(tables)), empty, extras, models)
 
 
@@ -101,8 +105,9 @@ def _bears_witness(sensor: SensorTable) -> bool:
 def _table(
     number: int, sensor: Sensor, errors: SensorErrors, bias: IntArray, constant: IntArray, joint: bool, gate: float
 ) -> SensorTable:
-    """Pack one sensor; `registers` and `witness` are set once their places are known. `gate` is in σ."""
+    """Pack one sensor; `registers`, `witness` and `spoken` are set once their places are known. `gate` is in σ."""
     c = sensor.coverage
+    single = sensor.reporting is Reporting.SINGLE
     sigma = sensor.sigma[Component.AZIMUTH]
     span = c.azimuth[1] - c.azimuth[0]
     if span <= 0.0:
@@ -130,6 +135,10 @@ def _table(
         witness=-1,
         gate_width=2.0 * gate * math.hypot(sigma if math.isfinite(sigma) else 0.0, errors.bias_azimuth),
         joint=joint,
+        single=single,
+        interval=(sensor.period or 0.0) if single else 0.0,
+        spoken=-1,
+        wrong_id=sensor.p_wrong_id if sensor.p_wrong_id is not None else (WRONG_ID if single else 0.0),
     )
 
 
@@ -144,11 +153,12 @@ def _settings(
 ) -> Settings:
     """Pack the settings; `ranging` are the ranging sensors in use, `report_range` (n_sensors,) theirs, 0 of others."""
     flat = d == 2
+    speed = config.speed_sigma if config.speed_sigma is not None else (8.0 if flat else 150.0)
     return Settings(
         d=d,
         q=config.q if config.q is not None else (0.1 if flat else 1.0),
         gates=np.array([0.0, *chi2.ppf(config.gate_probability, np.arange(1, 8))]),
-        speed_sigma=config.speed_sigma if config.speed_sigma is not None else (8.0 if flat else 150.0),
+        speed_sigma=speed,
         birth_rate=config.birth_rate,
         survival_time=config.survival_time,
         hide_time=config.hide_time,
@@ -156,7 +166,8 @@ def _settings(
         static_share=config.static_share,
         static_q=config.static_q,
         stop_floor=config.stop_floor,
-        start_speed=config.start_speed,
+        rest_time=config.rest_time,
+        start_speed=config.start_speed if config.start_speed is not None else START_SHARE * speed,
         targets_at_start=config.targets_at_start,
         doubt=config.doubt,
         delete_below=config.delete_below,
@@ -172,6 +183,7 @@ def _settings(
         clutter_memory=config.clutter_memory,
         blob=max([t.resolution for t in ranging], default=0.0),
         blob_share=config.blob_share,
+        hide_after=config.hide_after,
         extent=config.extent,
     )
 
@@ -216,7 +228,9 @@ def _constants(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[i
     ]
 
 
-def _before_all(settings: Settings, sensors: Sequence[SensorTable], n: int, witnesses: int, models: bool) -> Copies:
+def _before_all(
+    settings: Settings, sensors: Sequence[SensorTable], n: int, witnesses: int, spoken: int, models: bool
+) -> Copies:
     """Return one copy of a table without tracks of `n` states, which two models have too if wanted."""
     k = settings.n_constant
     clutter = np.zeros((len(sensors), AZIMUTH_BINS + 1))
@@ -239,6 +253,8 @@ def _before_all(settings: Settings, sensors: Sequence[SensorTable], n: int, witn
         beside=np.zeros(0, np.int64),
         told=np.zeros((0, k, k + 1)),
         witness=np.zeros((0, witnesses, 2)),
+        spoken=np.zeros((0, spoken, 4)),
+        pace=np.zeros((len(sensors), 4)),
         bank=np.zeros((k, k + 1)),
         undetected=np.full(1, settings.targets_at_start),
         seen_range=np.zeros(len(sensors)),

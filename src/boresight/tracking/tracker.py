@@ -18,7 +18,7 @@ from boresight.tracking.lagged import smoothed_rows
 from boresight.tracking.names import Names
 from boresight.tracking.output import Decisions, Rows, decisions_of, rows_of, unseen
 from boresight.tracking.window import Window, empty_window, take, what_became
-from boresight.types import NO_TRACK, Fate, FloatArray, Scan, Sensor
+from boresight.types import NO_TRACK, Fate, FloatArray, Reporting, Scan, Sensor, addresses_of
 
 REASON = {
     Fate.UNASSOCIATED: "no track took it, and it begins none",
@@ -81,12 +81,13 @@ class Tracker:
         length = self.config.window
         if length is None:
             # a look that sweeps one period arrives half of it after its middle
-            sweep = 0.5 * max((self.sensors[i].period or 0.0 for i in used), default=0.0)
+            sweep = 0.5 * max((_turn(self.sensors[i]) or 0.0 for i in used), default=0.0)
             length = max(latencies) - min(latencies) + sweep + 1.0
         object.__setattr__(self, "length", length)
         period = np.zeros(len(self.sensors))
         for i in used:
-            period[i] = np.nan if self.sensors[i].period is None else self.sensors[i].period
+            turn = _turn(self.sensors[i])
+            period[i] = np.nan if turn is None else turn
         object.__setattr__(self, "_period", period)
 
     @property
@@ -206,6 +207,7 @@ class Tracker:
             z=np.concatenate([scan.z for scan in scans]),
             R=np.concatenate([scan.covariance for scan in scans]),
             row=np.concatenate([scan.row for scan in scans]).astype(np.int64),
+            address=np.concatenate([addresses_of(scan) for scan in scans]),
             position=np.zeros((len(t) + len(scans), 3)),
             velocity=np.zeros((len(t) + len(scans), 3)),
             axes=np.zeros((len(t) + len(scans), 3, 3)),
@@ -231,3 +233,8 @@ class Tracker:
         if track is not None:
             R, until = looks.R[detections], np.repeat(known, np.diff(first))
             looks.R[detections] = add_navigation_noise(sensor, track, t[detections], looks.z[detections], R, until)
+
+
+def _turn(sensor: Sensor) -> float | None:
+    """Return the declared time between two looks of a sensor (s), None where none is: the period of messages is not."""
+    return None if sensor.reporting is Reporting.SINGLE else sensor.period
