@@ -25,6 +25,7 @@ from boresight.io.declaration import SensorTable, sensor_of
 from boresight.io.jsonlines import LookDecoder, Measured, Refused
 from boresight.io.recording import read_recording
 from boresight.io.scans import iter_scans
+from boresight.metrics.losses import losses
 from boresight.tracking import tracker as core
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.output import Rows
@@ -111,8 +112,10 @@ class Prepared:
                 "fates": counted(fates),
             },
             "seconds": seconds,
-            "t_first_s": float(recording.detections.t.min()),
-            "t_last_s": float(recording.detections.t.max()),
+            "lost": losses(recording, fates),
+            "notes": list(recording.notes),
+            "t_first_s": recording.span[0],
+            "t_last_s": recording.span[1],
             "window_s": tracker.length,
             "parameters": parameters_of(config) | ({"pipeline": pipeline_of(self.stages)} if self.stages else {}),
             "versions": versions(),

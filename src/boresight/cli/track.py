@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from boresight.cli.output import print_json
+from boresight.cli.output import print_json, print_notes
 from boresight.config.tracker import read_configuration
 from boresight.errors import UserError
 from boresight.io.files import check_output, output_folder
 from boresight.io.recording import read_recording
 from boresight.io.results import write_results
 from boresight.io.scans import selected
+from boresight.metrics.losses import loss_lines
 from boresight.tracking.config import TrackerConfig
 from boresight.types import Recording, Results, Scan
 
@@ -66,6 +67,7 @@ def track(
     """
     check_output(output, force, inputs=[rec, config])
     recording = read_recording(rec)
+    print_notes(recording.notes)
     ids = sensor_ids(recording, sensors)
     source = config if config is not None else (rec / BESIDE if (rec / BESIDE).is_file() else None)
     known = [s.id for s in recording.sensors]
@@ -88,6 +90,7 @@ def track(
             from boresight.report.html import write_report
 
             write_report(folder / "report.html", results, recording)
+    print_notes(loss_lines(recording, results.decisions))
     counts = results.summary["counts"]
     row = {"output": str(output), **counts, "seconds": results.summary["seconds"]}
     if json:

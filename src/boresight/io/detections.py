@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,9 +11,11 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from boresight.errors import did_you_mean
+from boresight.io import limits
 from boresight.io.declaration import DEG, SIGMA_KEYS
+from boresight.io.stamps import examine
 from boresight.io.table import LIST, NUMBER, TEXT, WHOLE, Table, in_unit, nullable
-from boresight.types import N_COMPONENTS, Axes, Component, Detections, FloatArray, Sensor
+from boresight.types import N_COMPONENTS, Axes, Component, Detections, FloatArray, Recording, Sensor
 
 POLAR = ("range_m", "azimuth_deg", "elevation_deg", "range_rate_m_s")
 CARTESIAN = ("x_m", "y_m", "z_m")
@@ -42,8 +46,12 @@ def is_frd(sensor: Sensor) -> bool:
     return sensor.axes in (Axes.BODY, Axes.MOUNT)
 
 
-def detections_of(table: Table, sensors: tuple[Sensor, ...]) -> tuple[Detections, NDArray[np.bool_]]:
-    """Return the detections of a table and which rows repeat an earlier one.
+def detections_of(
+    table: Table, sensors: tuple[Sensor, ...], others: Sequence[tuple[str, float, float]] = ()
+) -> tuple[Detections, NDArray[np.bool_], dict[int, str]]:
+    """Return the detections of a table, which rows repeat an earlier one, and which are refused with the reason.
+
+    `others` are name, first and last stamp (s) of platforms and targets. What the user is to know goes to the notes.
 
     Raises UserError for an unknown sensor, a value that cannot be, or a measured component without any sigma.
     """
@@ -53,23 +61,27 @@ def detections_of(table: Table, sensors: tuple[Sensor, ...]) -> tuple[Detections
         table.fail(None, "the table has no rows")
     t = table.numbers("t_s", required=True)
     sensor = _sensors(table, sensors)
-    z = _turned(_measured(table), sensors, sensor)
+    filed, emptied = _measured(table)
+    z = _turned(filed, sensors, sensor)
     sigma = _sigmas(table, sensors, sensor, z)
     covariance = _covariances(table, sensors, sensor, z, sigma)
     _check_noise(table, sensors, sensor, z, sigma)
-    recv = table.numbers("t_recv_s")
+    scan = table.whole("scan")
+    stamps = examine(t, table.numbers("t_recv_s"), sensor, scan, sensors, others, table.place)
+    refused = stamps.refused | dict.fromkeys(emptied, 'all that it measures says "not available"')
+    table.notes.extend(f"{table.path}: {f.text}" for f in stamps.findings)
     detections = Detections(
         t=t,
-        t_recv=np.maximum.accumulate(np.where(np.isnan(recv), np.maximum.accumulate(t), recv)),
+        t_recv=stamps.arrival,
         sensor=sensor,
-        scan=table.whole("scan"),
+        scan=scan,
         z=z,
         sigma=sigma,
         covariance=covariance,
         source_id=table.objects("source_id"),
         attributes=table.objects("attributes"),
     )
-    return detections, find_duplicates(detections)
+    return detections, find_duplicates(detections), dict(sorted(refused.items()))
 
 
 def _sensors(table: Table, sensors: tuple[Sensor, ...]) -> NDArray[np.int64]:
@@ -84,16 +96,18 @@ def _sensors(table: Table, sensors: tuple[Sensor, ...]) -> NDArray[np.int64]:
     return sensor
 
 
-def _measured(table: Table) -> FloatArray:
-    z = np.stack([table.numbers(name) for name in MEASURED], axis=1)
-    table.fail_where(z[:, Component.RANGE] < 0, "range_m is {}; a range is not negative", z[:, Component.RANGE])
-    elevation = z[:, Component.ELEVATION]
-    table.fail_where(np.abs(elevation) > 90.0, "elevation_deg is {}, outside -90 .. 90", elevation)
+def _measured(table: Table) -> tuple[FloatArray, list[int]]:
+    """What was measured (n, 7), and the rows in which all of it says "not available"."""
+    given = np.stack([table.numbers(name) for name in MEASURED], axis=1)
+    far = given[:, Component.RANGE]
+    table.fail_where((far < 0) & ~limits.absent("range_m", far), "range_m is {}; a range is not negative", far)
+    z = np.stack([table.checked(name) for name in MEASURED], axis=1)
+    emptied = np.flatnonzero(np.isnan(z).all(axis=1) & ~np.isnan(given).all(axis=1)).tolist()
     azimuth = z[:, Component.AZIMUTH]
     outside = (azimuth > 180.0) | (azimuth <= -180.0)
     azimuth[outside] = 180.0 - np.mod(180.0 - azimuth[outside], 360.0)  # into (-180, 180]
     out: FloatArray = z * UNITS
-    return out
+    return out, emptied
 
 
 def _sigmas(table: Table, sensors: tuple[Sensor, ...], sensor: NDArray[np.int64], z: FloatArray) -> FloatArray:
@@ -175,6 +189,25 @@ def find_duplicates(detections: Detections) -> NDArray[np.bool_]:
         if twins[row] and (other is None or not np.array_equal(other, detections.covariance[row], equal_nan=True)):
             twins[row] = False
     return twins
+
+
+def in_order(detections: Detections, order: NDArray[np.int64]) -> Detections:
+    """Return the rows in another order (n,)."""
+    place = {int(row): i for i, row in enumerate(order)}
+    parts = {name: getattr(detections, name)[order] for name in ("t", "t_recv", "sensor", "scan", "z", "sigma")}
+    texts = [detections.source_id, detections.attributes]
+    source, attributes = (None if one is None else [one[i] for i in order.tolist()] for one in texts)
+    covariance = {place[row]: full for row, full in detections.covariance.items()}
+    return Detections(**parts, covariance=covariance, source_id=source, attributes=attributes)
+
+
+def reordered(recording: Recording) -> Recording:
+    """Return a recording whose detections stand in order of arrival."""
+    order = np.argsort(recording.detections.t_recv, kind="stable")
+    place = {int(row): i for i, row in enumerate(order)}
+    refused = {place[row]: why for row, why in recording.refused.items()}
+    rows = in_order(recording.detections, order)
+    return replace(recording, detections=rows, duplicates=find_duplicates(rows), refused=dict(sorted(refused.items())))
 
 
 def columns_of(detections: Detections, sensors: tuple[Sensor, ...]) -> dict[str, Any]:

@@ -33,13 +33,17 @@ def platforms_of(table: Table, site: Site, dimensions: int) -> tuple[PlatformTra
     position = _platform_positions(table, site, dimensions)
     velocity = _columns(table, VELOCITY)
     ypr = _columns(table, YPR) * DEG
-    sigma = table.numbers("sigma_position_m")
-    turn = table.numbers("sigma_attitude_deg") * DEG
+    sigma = table.checked("sigma_position_m")
+    turn = table.checked("sigma_attitude_deg") * DEG
     arrived = table.numbers("t_recv_s")
     for name, values in (("sigma_position_m", sigma), ("sigma_attitude_deg", turn)):
         table.fail_where(values <= 0, f"{name} is not above zero; leave it null when not known")
+    known = np.asarray(np.isfinite(position).all(axis=1))  # without a position the rest of a row is of no use
     out = []
-    for name, rows, t in _by_name(table, "platform"):
+    for name, every, stamps in _by_name(table, "platform"):
+        rows, t = every[known[every]], stamps[known[every]]
+        if len(rows) == 0:
+            table.fail(None, f"no row of platform '{name}' has a position")
         if np.isnan(ypr[rows, 1:]).all():  # a heading alone: the platform is taken as level
             ypr[rows, 1:] = np.where(np.isnan(ypr[rows, :1]), np.nan, 0.0)
         columns = (position[rows], velocity[rows], ypr[rows], sigma[rows], turn[rows])
@@ -60,15 +64,17 @@ def _platform_positions(table: Table, site: Site, dimensions: int) -> FloatArray
     for name in GEODETIC[:2]:
         if name not in table:
             table.fail(None, f"column '{name}' is missing")
-    latitude, longitude = (table.numbers(n, required=True) for n in GEODETIC[:2])
-    table.fail_where(np.abs(latitude) > 90.0, "latitude_deg is {}, outside -90 .. 90", latitude)
+    latitude, longitude = (table.checked(n, required=True) for n in GEODETIC[:2])
     flat = dimensions == 2
     if "height_m" not in table and not flat:
         table.fail(None, "column 'height_m' is missing")
-    height = table.numbers("height_m", required=not flat, default=site.height)
+    height = table.checked("height_m", required=not flat, default=site.height)
     from boresight.frames.local import enu_from_geodetic  # compiled code: loaded only where it is needed
 
-    position = np.stack(enu_from_geodetic(latitude * DEG, longitude * DEG, height, site), axis=1)
+    position = np.full((len(table), 3), np.nan)
+    known = np.isfinite(latitude) & np.isfinite(longitude) & np.isfinite(height)
+    lat, lon, up = latitude[known] * DEG, longitude[known] * DEG, height[known]
+    position[known] = np.stack(enu_from_geodetic(lat, lon, up, site), axis=1)
     if flat:  # the plane of the tracks: neither antenna height nor the Earth's curvature is in it
         position[:, 2] = 0.0
     return position
@@ -99,7 +105,7 @@ def _positions(table: Table, dimensions: int) -> FloatArray:
 
 
 def _columns(table: Table, names: Sequence[str]) -> FloatArray:
-    return np.stack([table.numbers(n) for n in names], axis=1)
+    return np.stack([table.checked(n) for n in names], axis=1)
 
 
 def _by_name(table: Table, column: str) -> list[tuple[str, NDArray[np.int64], FloatArray]]:

@@ -93,7 +93,9 @@ def advance(
         while at > 0 and looks.t[order[at - 1]] > t:
             at -= 1
         later = t_recv > clock.now[ARRIVAL] > -math.inf
-        if not _has_room(tr, copies, looks, queue, k, at, times_due(clock, period, t_recv) if later else 0, rows):
+        if not _has_room(
+            tr, copies, looks, queue, k, at, times_due(tr, s, clock, period, t_recv) if later else 0, rows
+        ):
             return k
         if later:
             if clock.now[PENDING] != 0.0:

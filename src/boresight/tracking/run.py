@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,19 +78,30 @@ def track_rows(rows: Sequence[Rows]) -> TrackRows:
 def decision_rows(recording: Recording, tracker: Tracker, decisions: Sequence[Decisions], names: Names) -> DecisionRows:
     """Give every row of the recording its fate, in file order, those that never reached the tracker included."""
     used = np.isin(recording.detections.sensor, tracker.used)
-    return fates_of(used, recording.duplicates & used, decisions, names)
+    return fates_of(used, recording.duplicates & used, decisions, names, recording.refused)
 
 
 def fates_of(
-    used: NDArray[np.bool_], duplicate: NDArray[np.bool_], decisions: Sequence[Decisions], names: Names
+    used: NDArray[np.bool_],
+    duplicate: NDArray[np.bool_],
+    decisions: Sequence[Decisions],
+    names: Names,
+    refused: Mapping[int, str] | None = None,
 ) -> DecisionRows:
-    """Give every row its fate: `used` (n,) says of which sensors are in use, `duplicate` (n,) which repeat a row."""
+    """Give every row its fate.
+
+    `used` (n,) says of which sensors are in use, `duplicate` (n,) which repeat a row, `refused` why some rows are not
+    used at all.
+    """
     n = len(used)
     code = {fate: FATES.index(fate) for fate in FATES}
     fate = np.full(n, code[Fate.NOT_SELECTED], np.uint8)
     reason = np.full(n, "its sensor was left out", dtype=object)
     fate[duplicate] = code[Fate.DUPLICATE]
     reason[duplicate] = "the same row stands earlier"
+    for k, why in (refused or {}).items():
+        if used[k]:
+            fate[k], reason[k] = code[Fate.SCREENED], why
     birth = np.full(n, -1, np.int64)
     nis = np.full(n, np.nan)
     if decisions:

@@ -150,7 +150,7 @@ class Tracker:
         """Give the rows that the last arrival calls for, the decisions and the smoothed rows still in the window."""
         window, out = state.window, Output([], [], [])
         if window.clock.now[PENDING]:
-            times = times_due(window.clock, self._period, np.inf)
+            times = times_due(window.tracks, self.plan.settings, window.clock, self._period, np.inf)
             rows = row_table(times * int(window.tracks.live[0]), self.dimensions)
             rows_at_arrival(
                 window.tracks, self.plan.settings, window.clock, self._period, self.config.coast_after, rows,
