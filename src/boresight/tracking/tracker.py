@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from boresight.frames.pose import PoseTrack, add_navigation_noise, sensor_poses
+from boresight.frames.pose import PoseTrack, add_navigation_noise, has_pose, sensor_poses
 from boresight.kernels.tracker_looks import NO_LOOK, Looks, moment, places_of_looks
 from boresight.kernels.tracker_rows import ARRIVAL, PENDING, RowTable, row_table, rows_at_arrival, times_due
 from boresight.tracking.config import TrackerConfig
@@ -220,6 +220,9 @@ class Tracker:
         """Fill the poses of the looks `which` of one sensor and the noise of its navigation; `t` of all detections."""
         sensor = self.sensors[looks.sensor[which[0]]]
         track = self.poses.get(sensor.platform) if sensor.platform is not None else None
+        if sensor.platform is not None and not has_pose(sensor, track):  # none of its navigation has come
+            looks.t[which] = np.nan
+            return
         detections, poses, first = places_of_looks(looks, which)
         times = np.empty(len(poses))
         own = first[1:] + np.arange(len(which))  # the look itself stands behind its detections
