@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +18,7 @@ from boresight.types import Axes, Component, PlatformTrack, Pose, Sensor, Site
 from boresight.types.sensor import FloatArray
 
 FORETOLD = 2.8  # noise of a pose one stamp ahead against that of a stamp: √7.75, a quadratic over four stamps
+ALWAYS = -1e12  # s: the stamp of a platform at rest, before all others
 SLOPE_WINDOW = 1.0  # s to either side over which a missing velocity is fitted
 _NORTH_LEVEL: FloatArray = ENU_FROM_NED.copy()  # heading north, level: FRD is NED
 
@@ -155,9 +157,13 @@ def pose_track(
 
     Where velocities are missing they are the slope of a least-squares line over the stamps within ±1 s (at least
     the neighbours). With `site`, attitude and north-aligned axes refer to local level *at the platform*, which turns
-    by 0.009° per kilometre from the site's; without, the world is flat. Raises UserError for an empty track, stamps
-    that do not ascend, or a platform with no finite position.
+    by 0.009° per kilometre from the site's; without, the world is flat. One at rest is where its row says at all times.
+    Raises UserError for an empty track, stamps that do not ascend, or a platform with no finite position.
     """
+    if platform.at_rest:
+        always = np.full(len(platform.t), ALWAYS)
+        platform = replace(platform, t=always, t_recv=None, at_rest=False, velocity=np.zeros((len(always), 3)))
+        max_extrapolation = math.inf
     have = np.isfinite(platform.position).all(axis=1) & np.isfinite(platform.t)
     if not have.any():
         raise UserError(f"platform '{platform.id}': no row has a position")
@@ -191,10 +197,10 @@ def sensor_pose(sensor: Sensor, track: PoseTrack | None, t: ArrayLike) -> tuple[
     them: for `site_enu` and `platform_enu` east, north, up; for `body` and `mount` right, forward and minus down.
     The lever arm (FRD) turns with the platform and adds rate × arm to the velocity.
 
-    - `site_enu`: fixed at the site's origin; no lever arm.
+    - `site_enu`: fixed at the site's origin, or at its station with that place's east/north/up; no lever arm.
     - `platform_enu`: at the platform, north-aligned.
-    - `body`, `mount`: on the platform's body, turned by `mount` for the latter. Without a platform the body is the
-      site's north/east/down.
+    - `body`, `mount`: on the platform's body, turned by `mount` for the latter. Without a platform the body is north/
+      east/down of the site or station.
 
     Raises UserError for a platform sensor without a track, for one that needs attitude where there is none, and for
     times that the track does not cover.
@@ -202,7 +208,8 @@ def sensor_pose(sensor: Sensor, track: PoseTrack | None, t: ArrayLike) -> tuple[
     times = np.ascontiguousarray(np.atleast_1d(np.asarray(t, dtype=np.float64)))
     n = len(times)
     if sensor.axes == Axes.SITE_ENU:
-        return np.zeros((n, 3)), np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)).copy()
+        position, turn = _station(sensor, n)
+        return position, np.zeros((n, 3)), np.broadcast_to(turn, (n, 3, 3)).copy()
     if track is None:
         position, velocity, R, rate = _fixed(sensor, n)
     else:
@@ -296,7 +303,7 @@ def add_navigation_noise(
     if not len(t) or (a == 0.0 and p == 0.0):
         return covariance
     ahead = np.zeros(len(t), np.bool_)
-    if track.has_attitude:
+    if track.has_attitude and track.max_extrapolation < math.inf:
         newest = np.searchsorted(track.arrived_attitude, np.broadcast_to(known, t.shape), side="right") - 1
         ahead = t > track.t_attitude[np.maximum(newest, 0)]
     angle2 = (a * np.where(ahead, FORETOLD, 1.0)) ** 2
@@ -324,7 +331,15 @@ def _fixed(sensor: Sensor, n: int) -> tuple[FloatArray, FloatArray, FloatArray, 
         raise UserError(
             f"sensor '{sensor.id}' has axes = \"{sensor.axes}\" but there is no track of its platform{name}"
         )
-    return np.zeros((n, 3)), np.zeros((n, 3)), np.broadcast_to(_NORTH_LEVEL, (n, 3, 3)).copy(), np.zeros((n, 3))
+    position, turn = _station(sensor, n)
+    return position, np.zeros((n, 3)), np.broadcast_to(turn @ _NORTH_LEVEL, (n, 3, 3)).copy(), np.zeros((n, 3))
+
+
+def _station(sensor: Sensor, n: int) -> tuple[FloatArray, FloatArray]:
+    """Where a fixed sensor stands (n, 3), and how its local level is turned (3, 3)."""
+    if sensor.station is None:
+        return np.zeros((n, 3)), np.eye(3)
+    return np.tile(np.array(sensor.station.position), (n, 1)), np.array(sensor.station.enu_from_local)
 
 
 def _body_from_mount(sensor: Sensor) -> FloatArray:

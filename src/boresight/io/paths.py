@@ -29,7 +29,7 @@ IGNORE_SCHEMA: dict[str, str] = {
 
 
 def platforms_of(table: Table, site: Site, dimensions: int) -> tuple[PlatformTrack, ...]:
-    """Return the platforms of a table, positions in the site's east/north/up."""
+    """Return the platforms of a table, positions in the site's east/north/up; one of a single row is at rest there."""
     position = _platform_positions(table, site, dimensions)
     velocity = _columns(table, VELOCITY)
     ypr = _columns(table, YPR) * DEG
@@ -47,10 +47,9 @@ def platforms_of(table: Table, site: Site, dimensions: int) -> tuple[PlatformTra
         if np.isnan(ypr[rows, 1:]).all():  # a heading alone: the platform is taken as level
             ypr[rows, 1:] = np.where(np.isnan(ypr[rows, :1]), np.nan, 0.0)
         columns = (position[rows], velocity[rows], ypr[rows], sigma[rows], turn[rows])
-        came = arrived[rows]
-        out.append(
-            PlatformTrack(name, t, *columns, None if np.isnan(came).all() else np.where(np.isnan(came), t, came))
-        )
+        came = None if np.isnan(arrived[rows]).all() else np.where(np.isnan(arrived[rows]), t, arrived[rows])
+        at_rest = len(rows) == 1 and not np.nan_to_num(velocity[rows]).any()
+        out.append(PlatformTrack(name, t, *columns, came, at_rest))
     return tuple(out)
 
 
