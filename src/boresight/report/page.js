@@ -144,7 +144,7 @@ $("about").textContent = `${D.dimensions}-D, ${sig(span, 4)} s` + (sensors.lengt
 const scores = D.scores || [], own = scores.find(r => r.item === "tracks"), none = scores.find(r => r.item === "empty tracker");
 const counts = D.summary.counts || {};
 const tiles = [[String(D.tracks.length), "tracks"], [String(counts.reports ?? D.outcome.reduce((a, r) => a + r.rows, 0)), "reports"]];
-if (own) tiles.push([sig(own.gospa_rms_m, 3) + " m", `GOSPA RMS, cut off at 20 m (empty tracker ${sig(none.gospa_rms_m, 3)})`],
+if (own) tiles.push([sig(own.gospa_rms_m, 3) + " m", `GOSPA RMS, cut off at ${sig(own.cut_off_m, 3)} m (empty tracker ${sig(none.gospa_rms_m, 3)})`],
   [own.tracked_fraction === null ? "–" : sig(100 * own.tracked_fraction, 3) + " %", "of the time tracked"], [sig(own.position_rmse_m, 3) + (own.position_rmse_m === null ? "" : " m"), "position RMSE"],
   [sig(own.false_track_s, 3) + " s", "of false tracks"], [sig(own.nees_mean, 3), `NEES (${D.dimensions} is right)`]);
 for (const [v, w] of tiles) $("tiles").append(make("div", {class: "tile"}, make("b", {}, v), make("span", {}, w)));
@@ -333,7 +333,7 @@ if (own) {
   const details = make("details", targets.length <= 12 ? {open: ""} : {}, make("summary", {}, `by target (${targets.length})`));
   details.append(table([["target", "target", true], ["tracked_fraction", "tracked"], ["position_rmse_m", "RMSE, m"], ["identity_switches", "switches"], ["breaks", "breaks"], ["track_ids", "tracks that held it"], ["nees_mean", "NEES mean"], ["nees_in_band_95", "NEES in 95 %"]], targets));
   $("scores").append(details);
-  chart($("gospa"), {title: "GOSPA against time (20 m is what one miss and one false track cost together)", series: [{x: D.gospa.t.map(v => v / T), y: D.gospa.v.map(v => v / 100), colour: "#0b6aa2", label: "GOSPA, m"}], x: [0, span], y: [0, null], yl: "m", height: 170});
+  chart($("gospa"), {title: "GOSPA against time (the cut-off is what one miss and one false track cost together)", series: [{x: D.gospa.t.map(v => v / T), y: D.gospa.v.map(v => v / 100), colour: "#0b6aa2", label: "GOSPA, m"}], x: [0, span], y: [0, null], yl: "m", height: 170});
   const axes = ["east", "north", "up"];
   const paint = list => {
     $("errors").replaceChildren();

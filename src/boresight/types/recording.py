@@ -59,6 +59,7 @@ class Truth:
     t: FloatArray  # (n,) s, ascending
     position: FloatArray  # (n, 3) site ENU m
     velocity: FloatArray  # (n, 3) m/s, NaN where not given
+    sigma: FloatArray | None = None  # (n,) m per axis: the reference's own error, NaN where not given
 
 
 @dataclass(frozen=True, slots=True, eq=False)
