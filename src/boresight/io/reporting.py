@@ -14,6 +14,7 @@ LOOKS = 20  # that are needed to say anything
 FOLLOWED = 100  # looks of a camera that always see one thing in one place
 SMOOTH = 6.0  # standard deviations between two looks of what a camera follows, in the median
 SPEED = 1000.0  # m/s: what seems to move faster from message to message is another target
+REACH = 5.0  # s for which the tracker takes navigation on beyond its ends
 FAR = 1e6  # m from the site: no longer one place
 SWAPPED = 0.1  # of the distance that is left if latitude and longitude change places
 
@@ -49,11 +50,11 @@ def _single(recording: Recording, i: int) -> str:
     ids = [] if d.source_id is None else [d.source_id[r] for r in rows.tolist()]
     known = {name for name in ids if name is not None}
     if len(known) >= 2:
-        return f"each of its {len(rows)} messages has one row, of {len(known)} different source_id"
+        return f"each of its {len(rows)} messages is one row, of {len(known)} different source_id"
     if sensor.ranging:
         jumps = _jumps(d.z[rows], d.sigma[rows], d.t[rows])
         if jumps > 0.2:
-            return f"each of its {len(rows)} messages has one row, and {jumps:.0%} of them lie elsewhere than the one before"
+            return f"each of its {len(rows)} messages is one row, {jumps:.0%} of them far from the one before"
         return ""
     return _followed(sensor, d.z[rows], d.t[rows])
 
@@ -93,16 +94,15 @@ def _followed(sensor: Sensor, z: FloatArray, t: FloatArray) -> str:
 def place_notes(recording: Recording, force: bool) -> list[str]:
     """Say how far platforms and fixed sensors are from the site, and which axes sensors on platforms have.
 
-    Raises UserError, unless `force`, for what is further away than 1000 km, or near only with latitude and longitude the
-    other way round.
+    Raises UserError, unless `force`, for what is further away than 1000 km, or near only with latitude and longitude
+    the other way round.
     """
     said = []
     for sensor in recording.sensors:
         if sensor.platform is not None:
-            where = {"platform_enu": "north-aligned, at the platform", "body": "of the body", "mount": "of the mount"}
-            said.append(
-                f"{sensor.id}: axes = \"{sensor.axes}\" ({where[str(sensor.axes)]}) on platform '{sensor.platform}'"
-            )
+            where = {"platform_enu": "north-aligned", "body": "of its body", "mount": "of the mount on its body"}
+            axes = str(sensor.axes)
+            said.append(f"{sensor.id}: axes = \"{axes}\" ({where.get(axes, '')}, at platform '{sensor.platform}')")
     for name, place in places(recording):
         far = np.linalg.norm(place[:, :2], axis=1)
         said.append(f"{name}: {_span(far)} from the site")
@@ -119,6 +119,23 @@ def place_notes(recording: Recording, force: bool) -> list[str]:
     return said
 
 
+def coverage_notes(recording: Recording) -> list[str]:
+    """Say how many reports of each sensor lie before or after the navigation of its platform."""
+    d, by_id, said = recording.detections, {p.id: p for p in recording.platforms}, []
+    for i, sensor in enumerate(recording.sensors):
+        p = by_id.get(sensor.platform or "")
+        if p is None or p.at_rest:
+            continue
+        t = d.t[(d.sensor == i) & recording.usable] - sensor.latency
+        outside = int(((t < p.t[0] - REACH) | (t > p.t[-1] + REACH)).sum())
+        if outside:
+            said.append(
+                f"{sensor.id}: {outside} of {len(t)} reports lie outside the navigation of platform '{p.id}' "
+                f"({p.t[0]:.10g} … {p.t[-1]:.10g} s): they cannot be placed"
+            )
+    return said
+
+
 def places(recording: Recording) -> list[tuple[str, FloatArray]]:
     """Return names and positions (n, 3) (site ENU, m) of platforms and of fixed sensors with a place of their own."""
     out = [(f"platform '{p.id}'", p.position) for p in recording.platforms]
@@ -127,15 +144,15 @@ def places(recording: Recording) -> list[tuple[str, FloatArray]]:
 
 
 def _span(far: NDArray[np.float64]) -> str:
-    low, high = float(far.min()), float(far.max())
-    return f"{high / 1e3:.3g} km" if high - low < 10.0 else f"{low / 1e3:.3g} to {high / 1e3:.3g} km"
+    low, high = round(float(far.min())), round(float(far.max()))
+    return f"{high / 1e3:.4g} km" if high - low < 10 else f"{low / 1e3:.4g} to {high / 1e3:.4g} km"
 
 
 def _swapped(place: FloatArray, site: Site) -> float:
     """How far (m) a place would be from the site with its latitude and longitude the other way round."""
     from boresight.frames.local import enu_from_geodetic, geodetic_from_enu
 
-    latitude, longitude, height = geodetic_from_enu(*(float(v) for v in place), site)
+    latitude, longitude, height = geodetic_from_enu(float(place[0]), float(place[1]), float(place[2]), site)
     if abs(float(longitude)) > np.pi / 2.0:
         return float("inf")
     east, north, _ = enu_from_geodetic(float(longitude), float(latitude), float(height), site)

@@ -77,7 +77,7 @@ def import_csv(
     )
     if (np.diff(recording.detections.t_recv) < 0.0).any():  # logs laid end to end: the file's order is to be arrival's
         recording = reordered(recording)
-    said = reporting.place_notes(recording, options.far)
+    said = [*reporting.place_notes(recording, options.far), *reporting.coverage_notes(recording)]
     recording, guessed = reporting.guess_reporting(recording, _says_reporting(sensors))
     return replace(recording, notes=(*notes, *said, *guessed, *recording.notes)), tuple(maps)
 

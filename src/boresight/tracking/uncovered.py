@@ -17,6 +17,8 @@ def why_uncovered(
     """Return rows of the detections that were screened for want of a pose, with what is missing in words."""
     d = recording.detections
     out = []
+    of_look: dict[tuple[int, int], str] = {}
+    left = []
     for row in rows.tolist():
         sensor = recording.sensors[d.sensor[row]]
         track = poses.get(sensor.platform or "")
@@ -27,9 +29,13 @@ def why_uncovered(
         why = _missing(track.t, track.arrived, t, known, track, f"the navigation {name}")
         if why is None and len(track.t_attitude):
             why = _missing(track.t_attitude, track.arrived_attitude, t, known, track, f"the attitude {name}")
-        if why is not None:
+        look = int(d.sensor[row]), int(d.scan[row])
+        if why is None:  # the rest of its look has none
+            left.append((row, look))
+        else:
+            of_look[look] = why
             out.append((row, why))
-    return out
+    return out + [(row, of_look[look]) for row, look in left if look in of_look]
 
 
 def _missing(nodes: FloatArray, arrived: FloatArray, t: float, known: float, track: PoseTrack, what: str) -> str | None:
