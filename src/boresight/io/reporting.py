@@ -32,8 +32,8 @@ def guess_reporting(recording: Recording, declared: set[str]) -> tuple[Recording
         if why:
             sensors[i] = replace(sensor, reporting=Reporting.SINGLE)
             said.append(
-                f'{sensor.id}: reporting = "single" (no miss by absence): {why}; declare reporting = "scan" if its looks '
-                "show all that is there"
+                f'{sensor.id}: reporting = "single" (no miss by absence): {why}; declare reporting = "scan" if its '
+                "looks show all that is there"
             )
     return replace(recording, sensors=tuple(sensors)), said
 
