@@ -27,13 +27,17 @@ def read_toml(path: Path | str) -> dict[str, Any]:
         return tomllib.loads(read_text(path))
     except tomllib.TOMLDecodeError as error:
         raise UserError(f"{path}: not valid TOML: {error}") from None
+    except RecursionError:
+        raise UserError(f"{path}: not valid TOML: tables or lists are nested too deeply") from None
 
 
 def convert(value: Any, model: type[T], where: str) -> T:
     """Convert plain values into a TableModel; raises UserError that names the key under `where`."""
-    _check_keys(value, msgspec.inspect.type_info(model), where, "")
     try:
+        _check_keys(value, msgspec.inspect.type_info(model), where, "")
         return msgspec.convert(value, model)
+    except RecursionError:
+        raise UserError(f"{where}: tables or lists are nested too deeply") from None
     except msgspec.ValidationError as error:
         text, _, place = str(error).partition(" - at `$")
         key = place.rstrip("`").lstrip(".")

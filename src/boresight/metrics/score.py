@@ -193,9 +193,18 @@ def _every_nees(
                 sigma = np.nan_to_num(np.interp(t[k], one.t, one.sigma))
                 covariance = covariance + np.eye(d) * sigma[:, None, None] ** 2
             error = errors[i][k]
-            turned = np.linalg.solve(covariance, error[:, :, None])[:, :, 0]
-            targets[i].nees += np.einsum("ki,ki->k", error, turned).tolist()
+            targets[i].nees += normalised(error, covariance).tolist()
             targets[i].nees_times += t[k].tolist()
+
+
+def normalised(error: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return e' P^-1 e (n,) of errors (n, d) and covariances (n, d, d); infinite where a covariance is singular."""
+    variance = np.linalg.eigvalsh(covariance)
+    good = variance[:, 0] > 1e-14 * np.maximum(variance[:, -1], 1e-300)
+    out = np.full(len(error), np.inf)
+    turned = np.linalg.solve(covariance[good], error[good, :, None])[:, :, 0]
+    out[good] = np.einsum("ki,ki->k", error[good], turned)
+    return out
 
 
 def _walk(recording: Recording, truth: list[Sampled], rows: TrackRows, clock: FloatArray, c: float) -> Score:
