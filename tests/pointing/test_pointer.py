@@ -138,9 +138,9 @@ def test_the_orbit_is_keplers() -> None:
 
 def test_the_transition_is_the_flows_derivative() -> None:
     x = np.array([6.9e6, 1e5, 2e5, 100.0, 5e3, 5.5e3, 0.0, 0.0, 0.0])
-    w = np.zeros(guide.WORK)
+    w = np.zeros((guide.ROWS, guide.LEAST_WIDTH))
     guide.advance(x.copy(), guide.ORBIT, 2.0, w)
-    F = w[guide.F : guide.F + 6, :6]
+    F = w[guide.ROW_F : guide.ROW_F + 6, :6]
     for j in range(6):
         h = 10.0 if j < 3 else 0.1
         a, b = x[:6].copy(), x[:6].copy()

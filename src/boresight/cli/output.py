@@ -13,9 +13,12 @@ from boresight._version import __version__
 from boresight.io.results import finite
 
 
-def print_json(command: str, parameters: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> None:
-    """Print the one object that `--json` promises on standard output."""
+def print_json(
+    command: str, parameters: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], notes: Sequence[str] | None = None
+) -> None:
+    """Print the one object that `--json` promises on standard output; `notes` tells what rows cannot."""
     data = {"command": command, "version": __version__, "parameters": parameters, "rows": rows}
+    data |= {} if notes is None else {"notes": notes}
     print(json.dumps(finite(data), indent=1, ensure_ascii=False, allow_nan=False))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import shlex
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     pass
 
 LONGEST_LAG = 600.0  # s
-LOADS_IN = 4.0  # s: what takes longer is compiled
+TRACKER_KERNEL = "kernels.tracker_window.advance"  # by far the longest to compile
 BESIDE = "tracker.toml"  # a configuration that lies in the recording's folder is used unless --config names another
 
 
@@ -138,27 +137,24 @@ def track_recording(
 
 @contextlib.contextmanager
 def loading() -> Iterator[None]:
-    """Say that kernels are loaded, and that the first run compiles them, while that goes on."""
-    from boresight.tracking.cache import compiled, seldom_collected
+    """Say which kernel is compiled, which the first run does, once one is; nothing where they are only loaded."""
+    from boresight.tracking.cache import seldom_collected, told_of_compiling
 
-    said = threading.Event()
-
-    def say() -> None:
-        said.set()
-        print("boresight: compiling kernels, on the first run only (about a minute) …", file=sys.stderr, flush=True)
-
+    first: list[str] = []
     started = time.perf_counter()
-    late = threading.Timer(LOADS_IN, say)  # another tracker's kernel may be there, but not this one's
-    if compiled():
-        late.start()
-    else:
-        say()
-    try:
-        with seldom_collected():
-            yield
-    finally:
-        late.cancel()
-    if said.is_set():
+
+    def say(kernel: str) -> None:
+        if not first:
+            first.append(kernel)
+            whole = "about a minute" if kernel == TRACKER_KERNEL else "some seconds"
+            print(f"boresight: compiling {kernel}, on the first run only ({whole}) …", file=sys.stderr, flush=True)
+        elif kernel == TRACKER_KERNEL and kernel not in first:
+            first.append(kernel)
+            print(f"boresight: compiling {kernel} (about a minute) …", file=sys.stderr, flush=True)
+
+    with seldom_collected(), told_of_compiling(say):
+        yield
+    if first:
         print(f"boresight: compiled in {time.perf_counter() - started:.0f} s", file=sys.stderr, flush=True)
 
 

@@ -78,6 +78,7 @@ class SourceTable(TableModel, frozen=True):
     sigma_bias_m: float = 0.0
     correlation_s: float | None = None
     sigma_up_m: float = 10.0
+    latency_s: float = 0.0
     tracks: str | None = None
     track_id: int | None = None
     axes: Literal["site_enu", "platform_enu", "body"] = "site_enu"
@@ -214,11 +215,12 @@ def _source(s: SourceTable) -> GuideSource:
 
 
 def _declared(s: Sensor) -> GuideSource:
-    """A sensor as a source: of directions if it measures angles (its larger one), else of positions."""
-    angles = [float(v) for v in s.sigma[[Component.AZIMUTH, Component.ELEVATION]] if v > 0]
-    if angles:
-        r = float(s.sigma[Component.RANGE])
-        return GuideSource(s.id, sigma_angle=max(angles), sigma_range=r if r > 0 else 0.0)
+    """A sensor as a source: of directions if it measures an angle or a range, else of positions."""
+    azimuth, elevation, far = (
+        float(v) if v > 0 else 0.0 for v in s.sigma[[Component.AZIMUTH, Component.ELEVATION, Component.RANGE]]
+    )
+    if azimuth or elevation or far:
+        return GuideSource(s.id, sigma_azimuth=azimuth, sigma_elevation=elevation, sigma_range=far)
     position = [float(v) for v in s.sigma[[Component.EAST, Component.NORTH, Component.UP]] if v > 0]
     if not position:
         raise UserError(f"sensor '{s.id}' measures neither direction nor position: it cannot guide a beam")

@@ -7,10 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
 from boresight.engine.loop import Item, Tick
-from boresight.kernels.guide import DIRECTION
 from boresight.pointing.pointer import Place, Pointer, PointerState, Pointing
 from boresight.pointing.reports import Report
 
@@ -69,7 +66,7 @@ class Guiding:
             elif isinstance(item, Report):
                 fates.append((item.source, self._take(now, item)))
             elif isinstance(item, tuple) and item and isinstance(item[0], Report):
-                best = item[0] if len(item) == 1 else min(item, key=lambda r: self._distance(now, r))
+                best = item[0] if len(item) == 1 else min(item, key=lambda r: self._surprise(now, r))
                 fates.append((best.source, self._take(now, best)))
         return GuidingState(now, due), GuideOutput(out, fates, now)
 
@@ -80,23 +77,5 @@ class Guiding:
     def _take(self, state: PointerState, r: Report) -> int:
         return self.pointer.take(state, r.source, r.t, r.z, r.origin, r.axes)
 
-    def _distance(self, state: PointerState, r: Report) -> float:
-        """Return how far a report lies from the prediction (rad, or m for positions); 0 before there is one."""
-        predicted = self.pointer.guide.predict(state.guide, r.t)
-        if predicted is None:
-            return 0.0
-        if self.pointer.guide.sources[r.source].kind != DIRECTION:
-            return float(np.linalg.norm(r.z[:3] - predicted.position))
-        d = r.axes.T @ (predicted.position - r.origin)
-        azimuth, elevation = math.atan2(d[0], d[1]), math.atan2(d[2], math.hypot(d[0], d[1]))
-        seen_azimuth, seen_elevation = float(r.z[0]), float(r.z[1])
-        if math.isnan(seen_elevation):
-            seen_elevation = elevation
-        if math.isnan(seen_azimuth):
-            seen_azimuth = azimuth
-        return float(np.arccos(np.clip(_unit(seen_azimuth, seen_elevation) @ _unit(azimuth, elevation), -1.0, 1.0)))
-
-
-def _unit(azimuth: float, elevation: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    c = math.cos(elevation)
-    return np.array([c * math.sin(azimuth), c * math.cos(azimuth), math.sin(elevation)])
+    def _surprise(self, state: PointerState, r: Report) -> float:
+        return self.pointer.guide.surprise(state.guide, r.source, r.t, r.z, r.origin, r.axes)

@@ -18,11 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boresight.frames.local import ecef_from_enu, ecef_from_enu_rotation, enu_from_ecef, enu_from_geodetic
+from boresight.io import limits
 from boresight.io.arrivals import OLDEST, TOLERANCE, SourceHealth, restored
 from boresight.io.declaration import DEG, SIGMA_KEYS
-from boresight.io.detections import ENU_FROM_FRD, FRD_ORDER, UNITS, is_frd
+from boresight.io.detections import ENU_FROM_FRD, FRD_ORDER, MEASURED, UNITS, is_frd
+from boresight.io.paths import YPR
 from boresight.kernels.geodesy import ecef_from_geodetic
-from boresight.types import N_COMPONENTS, Axes, Component, FloatArray, Scan, Sensor, Site
+from boresight.types import N_COMPONENTS, VELOCITY, Axes, Component, FloatArray, Scan, Sensor, Site
+from boresight.types.scan import address_code
 
 LONGEST = 1 << 18  # bytes of one line; longer ones are counted and left out
 LONGEST_SILENCE = 86_400.0  # s between two arrivals that lines give themselves
@@ -80,6 +83,8 @@ class Line(Measured, frozen=True):
     roll_deg: float | None = None
 
 
+MEASURED_NAMES = (*MEASURED, "latitude_deg", "longitude_deg", "height_m")
+_SENTINELS = {name: frozenset(limits.NOT_AVAILABLE.get(name, ())) for name in (*MEASURED_NAMES, *YPR, *VELOCITY)}
 _DECODER = msgspec.json.Decoder(Line)
 
 
@@ -281,9 +286,16 @@ class LookDecoder:
                 return None
             z, t, R, rows = z[keep], t[keep], R[keep], rows[keep]
         middle = 0.5 * (float(t.min()) + float(t.max()))
-        return Scan(sensor, middle, arrival, t, z, R, rows)
+        names = [found[i].source_id for i in (rows - first)]
+        codes = None if not any(names) else np.array([address_code(name) for name in names], np.int64)
+        return Scan(sensor, middle, arrival, t, z, R, rows, (), codes)
 
     def _values(self, found: Sequence[Measured], sensor: Sensor) -> FloatArray:
+        for d in found:
+            for name in MEASURED_NAMES:
+                value = getattr(d, name)
+                if value is not None and value in _SENTINELS[name]:
+                    raise Refused("not_available", limits.problem(name, value) or name)
         z = np.array([[
             d.range_m, d.azimuth_deg, d.elevation_deg, d.range_rate_m_s, d.x_m, d.y_m, d.z_m,
         ] for d in found], dtype=np.float64)  # fmt: skip
@@ -291,9 +303,7 @@ class LookDecoder:
             if d.latitude_deg is not None or d.longitude_deg is not None:
                 z[i, Component.EAST :] = self._placed(d, sensor)
         if not (np.isfinite(z).any(axis=1)).all() or np.isinf(z).any():
-            raise Refused(
-                "bad_value", "a detection without a measured number (a look that saw nothing: detections = [])"
-            )
+            raise Refused("bad_value", "a detection without a measured number (a look without any has detections = [])")
         far, azimuth, elevation = z[:, Component.RANGE], z[:, Component.AZIMUTH], z[:, Component.ELEVATION]
         if (far < 0.0).any():
             raise Refused("bad_value", f"range_m = {np.nanmin(far):g} is negative")
@@ -423,6 +433,11 @@ def _full(d: Measured, sensor: Sensor, z: FloatArray, sigma: FloatArray) -> Floa
     return full
 
 
+def known(name: str, value: float | None) -> float | None:
+    """Return a value of a column, None where it is one that says "not available"."""
+    return None if value is None or value in _SENTINELS[name] else value
+
+
 def check_geodetic(latitude: float, longitude: float, height: float | None) -> None:
     """Raise Refused for a place that is none: latitude beyond ±90°, longitude beyond ±180° (degrees), height (m)."""
     if not abs(latitude) <= 90.0:
@@ -462,6 +477,7 @@ def velocity(m: Line) -> FloatArray | None:
     """Return the velocity (3,) (m/s) in the axes of `position`, None if there is none; raises Refused."""
     local, ecef = (m.ve_m_s, m.vn_m_s, m.vu_m_s), (m.vx_m_s, m.vy_m_s, m.vz_m_s)
     a, b, c = local if m.x_m is None or m.latitude_deg is not None else ecef
+    a, b, c = (known(name, value) for name, value in zip(VELOCITY, (a, b, c), strict=True))
     if a is None or b is None:
         return None
     if c is None:
@@ -489,11 +505,12 @@ def navigation(m: Line, site: Site, flat: bool = False) -> FloatArray:
         v = velocity(m)
         if v is not None:
             row[3:6] = ecef_from_enu_rotation(site).T @ R @ v
-    if m.yaw_deg is not None:
-        pitch, roll = m.pitch_deg or 0.0, m.roll_deg or 0.0
-        if not (abs(m.yaw_deg) <= 360.0 and abs(pitch) <= 90.0 and abs(roll) <= 180.0):
-            raise Refused("bad_value", f"yaw {m.yaw_deg:g}, pitch {pitch:g}, roll {roll:g} deg: beyond 360, 90 or 180")
-        row[6:] = m.yaw_deg * DEG, pitch * DEG, roll * DEG
+    yaw = known("yaw_deg", m.yaw_deg)
+    if yaw is not None:
+        pitch, roll = known("pitch_deg", m.pitch_deg) or 0.0, known("roll_deg", m.roll_deg) or 0.0
+        if not (abs(yaw) <= 360.0 and abs(pitch) <= 90.0 and abs(roll) <= 180.0):
+            raise Refused("bad_value", f"yaw {yaw:g}, pitch {pitch:g}, roll {roll:g} deg: beyond 360, 90 or 180")
+        row[6:] = yaw * DEG, pitch * DEG, roll * DEG
     if not (np.isfinite(row[:3]).all() or np.isfinite(row[6:]).all()):
         raise Refused("bad_value", "navigation needs a position, or yaw_deg")
     return row

@@ -64,6 +64,11 @@ def is_log(path: Path) -> bool:
     return (path / MARKER).is_file()
 
 
+def is_point_log(path: Path) -> bool:
+    """Return whether a log is of `boresight point`: of guide sources, not of sensors."""
+    return "sensor" not in read_toml(path / SITE)
+
+
 @dataclass(slots=True)
 class LogWriter:
     """Appends records; nothing that the disk does is raised once it is open.
@@ -234,9 +239,7 @@ class LogReader:
         except OSError as error:
             self.damage.append(f"{path.name}: cannot be read ({reason(error)})")
             return
-        self.damage.append(
-            f"{path.name}: cut or damaged at byte {at} of {size}; the {size - at} bytes from there are lost"
-        )
+        self.damage.append(f"{path.name}: cut or damaged at byte {at} of {size}; what follows there is lost")
 
     def _record(self, read: object, head: bytes, number: int, at: int) -> Record | None:
         if len(head) < HEADER.size:

@@ -8,8 +8,20 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from boresight.kernels.guide import ACCELERATION, EARTH_RATE, ORBIT, TRACK, WORK, advance, look_at, spin
-from boresight.kernels.guide_update import CLIP, bring_to, report_position, start, update
+from boresight.kernels.guide import (
+    ACCELERATION,
+    EARTH_RATE,
+    LEAST_WIDTH,
+    N_BIAS,
+    ORBIT,
+    ROWS,
+    TRACK,
+    advance,
+    look_at,
+    spin,
+)  # fmt: skip
+from boresight.kernels.guide_begin import first_place
+from boresight.kernels.guide_update import CLIP, bring_to, start, update
 from boresight.kernels.options import PART
 from boresight.types.sensor import FloatArray
 
@@ -23,36 +35,45 @@ ASLEEP = -8.0  # one that is further back rests, once the filter has settled …
 SETTLED = 60.0  # … after so many reports
 WAKE = 4.0  # rejections of one source in a row that wake the hypothesis that it is biased
 ACCEPTED, REJECTED, WAITING, STALE = 0, 1, 2, 3
+EMPTY = 5  # nothing in it that its source has a sigma for (4 is `pointing.guide.THINNED`)
 
 
 @njit(cache=True)
 def step(
     clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, scale: FloatArray, run_of: FloatArray,
-    settings: FloatArray, spread: FloatArray, source: int, kind: int, t: float, z: FloatArray, origin: FloatArray,
-    axes: FloatArray,
-    sigma: FloatArray, sigma_bias: FloatArray, w: FloatArray,
+    seen: FloatArray, settings: FloatArray, spread: FloatArray, source: int, kind: int, t: float, z: FloatArray,
+    origin: FloatArray, axes: FloatArray, sigma: FloatArray, offsets: FloatArray, sigma_bias: FloatArray, w: FloatArray,
 ) -> int:  # fmt: skip
-    """Take one report into every hypothesis; returns ACCEPTED, REJECTED, WAITING (no start yet) or STALE.
+    """Take one report into every hypothesis; returns ACCEPTED, REJECTED, WAITING (no start yet), STALE or EMPTY.
 
-    `sigma` (2,) is the report's: across (rad) and range (m) for a direction, per axis (m) for a position. `scale` (s,)
-    is the learned factor on each source's variance, `run_of` (s,) its run of rejections. Hypothesis 0 has no bias,
-    hypothesis 1 + s one of source s, with the prior `sigma_bias` (s,) (m; 0: the source has none).
+    `sigma` (4,) is the report's (`look_at`). `scale` (s,) is the learned factor on each source's variance, `run_of`
+    (s,) its run of rejections, `seen` (s, N_SEEN) what it said before the start. Hypothesis 0 has none of the gross
+    biases, hypothesis 1 + s one of source s, with the prior `sigma_bias` (s,) (m; 0: the source has none). `offsets`
+    (s, 4) are priors of constant biases in azimuth, elevation, range and time, that every hypothesis holds (0: none).
     """
     dynamics, q = int(settings[S_DYNAMICS]), settings[S_Q]
-    if clock[C_STARTED] == 0.0 and not _begin(clock, X, P, L, dynamics, sigma_bias, spread, kind, t, z, origin, axes):
+    if clock[C_STARTED] == 0.0 and not _begin(
+        clock, X, P, L, dynamics, settings[S_MAX_AGE], offsets, sigma_bias, spread, seen, source, kind, t, z, origin,
+        axes,
+    ):  # fmt: skip
         return WAITING
     _bring_all(clock, X, P, L, dynamics, q, t, w)
     if t < clock[C_TIME] - settings[S_MAX_AGE]:
         return STALE
     k = look_at(kind, t, z, origin, axes, sigma, scale[source], w)
+    if k == 0:
+        return EMPTY
     best, m, lag = int(clock[C_BEST]), X.shape[1] - 3, t - clock[C_TIME]
+    first = _first(dynamics, source, offsets)
     fate = REJECTED
     nis, share = 0.0, 0.0
     for h in range(len(X)):
         if L[h] <= RESTING:
             continue
         n = m if h == 0 else m + 3
-        e, l, s = update(X[h], P[h], n, lag, h == source + 1, dynamics, q, kind, k, settings[S_GATE], w)
+        e, l, s = update(
+            X[h], P[h], n, lag, h == source + 1, first, offsets[source], dynamics, q, kind, k, settings[S_GATE], w
+        )
         L[h] += l if l - l == 0.0 else -CLIP
         if h == best:
             nis, share = e, s
@@ -76,18 +97,56 @@ def step(
     return fate
 
 
+@njit(cache=True)
+def surprise(
+    clock: FloatArray, X: FloatArray, P: FloatArray, scale: FloatArray, settings: FloatArray, source: int, kind: int,
+    t: float, z: FloatArray, origin: FloatArray, axes: FloatArray, sigma: FloatArray, offsets: FloatArray,
+    w: FloatArray,
+) -> float:  # fmt: skip
+    """Return the NIS that a report would have in the likeliest hypothesis, NaN before the start or for an empty one.
+
+    The state is left alone.
+    """
+    if clock[C_STARTED] == 0.0:
+        return math.nan
+    k = look_at(kind, t, z, origin, axes, sigma, scale[source], w)
+    if k == 0:
+        return math.nan
+    dynamics, q = int(settings[S_DYNAMICS]), settings[S_Q]
+    best, m = int(clock[C_BEST]), X.shape[1] - 3
+    n = m if best == 0 else m + 3
+    x, C = X[best].copy(), P[best].copy()
+    bring_to(x, C, n, clock[C_TIME], dynamics, q, t, w)
+    first = _first(dynamics, source, offsets)
+    lag = min(t - clock[C_TIME], 0.0)
+    return update(x, C, n, lag, best == source + 1, first, offsets[source], dynamics, q, kind, k, -1.0, w)[0]
+
+
+@njit(**PART)
+def _first(dynamics: int, source: int, offsets: FloatArray) -> int:
+    """Return the number in a state of a source's first bias."""
+    first = 6 if dynamics == ORBIT else 9
+    for s in range(source):
+        for j in range(N_BIAS):
+            if offsets[s, j] > 0.0:
+                first += 1
+    return first
+
+
 @njit(**PART)
 def _begin(
-    clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, dynamics: int, sigma_bias: FloatArray,
-    spread: FloatArray, kind: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray,
+    clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, dynamics: int, held: float, offsets: FloatArray,
+    sigma_bias: FloatArray, spread: FloatArray, seen: FloatArray, source: int, kind: int, t: float, z: FloatArray,
+    origin: FloatArray, axes: FloatArray,
 ) -> bool:  # fmt: skip
     where, here, velocity = np.empty(3), np.empty(3), np.zeros(3)
-    if not report_position(kind, t, z, origin, axes, where):
+    if not first_place(seen, source, kind, t, z, origin, axes, held, where):
         return False
     spin(t, where, here)
     if dynamics == ACCELERATION:  # at rest on the Earth
         velocity[0], velocity[1] = -EARTH_RATE * here[1], EARTH_RATE * here[0]
-    start(X, P, here, velocity, spread, sigma_bias)
+    start(X, P, 6 if dynamics == ORBIT else 9, here, velocity, spread, offsets, sigma_bias)
+    seen[:] = math.nan
     L[:] = 0.0
     for h in range(1, len(L)):
         if sigma_bias[h - 1] == 0.0:
@@ -152,7 +211,7 @@ def predict_to(
         return False
     best = int(clock[C_BEST])
     dynamics, q = int(settings[S_DYNAMICS]), settings[S_Q]
-    m = X.shape[1] - 3
+    m = 6 if dynamics == ORBIT else 9
     x = X[best].copy()
     C = P[best].copy()
     if t >= clock[C_TIME]:
@@ -179,9 +238,9 @@ def predict_to(
 @njit(cache=True)
 def run(
     clock: FloatArray, X: FloatArray, P: FloatArray, L: FloatArray, scale: FloatArray, run_of: FloatArray,
-    settings: FloatArray, spread: FloatArray, source: NDArray[np.int64], kind: NDArray[np.int64], t: FloatArray,
-    t_recv: FloatArray,
-    z: FloatArray, origin: FloatArray, axes: FloatArray, sigma: FloatArray, sigma_bias: FloatArray,
+    seen: FloatArray, settings: FloatArray, spread: FloatArray, source: NDArray[np.int64], kind: NDArray[np.int64],
+    t: FloatArray, t_recv: FloatArray, z: FloatArray, origin: FloatArray, axes: FloatArray, sigma: FloatArray,
+    offsets: FloatArray, sigma_bias: FloatArray,
     t_node: FloatArray, t_aim: FloatArray, position: FloatArray, velocity: FloatArray, covariance: FloatArray,
     best: NDArray[np.int64], fate: NDArray[np.int64],
 ) -> None:  # fmt: skip
@@ -190,12 +249,12 @@ def run(
     Fills (k, 3), (k, 3), (k, 3, 3) per node, NaN before the start, the hypothesis in use, and each report's fate.
     """
     row = 0
-    w = np.zeros(WORK)
+    w = np.zeros((ROWS, max(X.shape[1], LEAST_WIDTH)))
     for k in range(len(t_node)):
         while row < len(t) and t_recv[row] <= t_node[k]:
             fate[row] = step(
-                clock, X, P, L, scale, run_of, settings, spread, source[row], kind[row], t[row], z[row], origin[row],
-                axes[row], sigma[row], sigma_bias, w,
+                clock, X, P, L, scale, run_of, seen, settings, spread, source[row], kind[row], t[row], z[row],
+                origin[row], axes[row], sigma[row], offsets, sigma_bias, w,
             )  # fmt: skip
             row += 1
         if not predict_to(clock, X, P, settings, t_aim[k], position[k], velocity[k], covariance[k], w):

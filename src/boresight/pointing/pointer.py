@@ -98,7 +98,10 @@ class Pointer:
         origin: FloatArray = NONE,
         axes: FloatArray = EYE,
     ) -> int:
-        """Take in one report in the state's own arrays; returns its fate (`kernels.guide_run`), -1 if not allowed."""
+        """Take in one report in the state's own arrays; returns its fate (`kernels.guide_run`), -1 if not allowed.
+
+        Of a direction any of azimuth, elevation and range may be NaN: not measured (see `GuideFilter.step`).
+        """
         if not self.allowed(source):
             return -1
         fate = self.guide.step(state.guide, source, t, z, origin, axes)
@@ -181,12 +184,13 @@ class Pointer:
         By the learned variance of each source; none for one that is not fresh or is held to be biased.
         """
         sources = self.guide.sources
-        angle = np.array([s.sigma_angle * out.aim.distance for s in sources])
+        angle = np.array([s.sigma_across * out.aim.distance for s in sources])
         sigma = np.where(angle > 0.0, angle, [s.sigma_position for s in sources])
         sigma = np.where(sigma > 0.0, sigma, state.spread)
         fresh = out.t - state.last <= self.stale
         biased = np.arange(1, len(sources) + 1) == int(state.guide.clock[C_BEST])
-        share = np.where(fresh & ~biased, 1.0 / (state.guide.scale * sigma**2), 0.0)
+        says = fresh & ~biased & (sigma > 0.0)  # a range alone says nothing across the line of sight
+        share = np.where(says, 1.0 / (state.guide.scale * np.where(says, sigma, 1.0) ** 2), 0.0)
         return share / max(float(share.sum()), 1e-300)
 
     def _mode(self, state: PointerState, t: float, aim: Aim) -> Mode:

@@ -1,4 +1,4 @@
-"""Bytes from outside to reports of guide sources: JSON lines, each checked, everything refused counted with a reason."""
+"""Bytes from outside to reports of guide sources: JSON lines, each checked, all that is refused counted."""
 
 from __future__ import annotations
 
@@ -155,9 +155,7 @@ def placed(m: Line, source: GuideSource, site: Site) -> tuple[FloatArray, FloatA
     """Return `z` (3,) or (6,) and `axes` of a position or track (`GuideFilter.step`); raises Refused."""
     where = position(m, site)
     if where is None:
-        raise Refused(
-            "bad_value", "no whole position: latitude_deg, longitude_deg, height_m, or three Cartesian values"
-        )
+        raise Refused("bad_value", "no whole position: latitude_deg, longitude_deg, height_m, or x, y, z")
     at, R = where
     if m.covariance is None:
         if source.correlation is not None:

@@ -51,8 +51,7 @@ def make_plan(
     taking = range(len(sensors)) if used is None else used
     if len({i % MOST_SENSORS for i in taking}) < len(taking):
         raise UserError(
-            f"{len(sensors)} sensors: the tracker tells at most {MOST_SENSORS} apart; use fewer (--sensors), the ones in "
-            f"use within {MOST_SENSORS} of each other"
+            f"{len(sensors)} sensors: the tracker tells at most {MOST_SENSORS} apart; use fewer (--sensors)"
         )
     sigma: list[float] = []
     tau: list[float] = []

@@ -101,8 +101,8 @@ class Tracker:
             return ""
         names = ", ".join(self.sensors[i].id for i in self.used) or "none"
         return (
-            f"no sensor in use can begin a track ({names}): one of them has to measure range and azimuth, or a position "
-            "(sigma_range_m with sigma_azimuth_deg, or sigma_position_m, in its [[sensor]])"
+            f"no sensor in use can begin a track ({names}): one of them has to measure range and azimuth "
+            "(sigma_range_m, sigma_azimuth_deg) or a position (sigma_position_m)"
         )
 
     def init(self) -> TrackerState:
