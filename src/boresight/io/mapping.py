@@ -21,6 +21,7 @@ from boresight.io.columns import (
     DAY_SECONDS,
     EXTRA,
     ISO,
+    MSL,
     TABLES,
     TIME,
     UNITS,
@@ -39,7 +40,7 @@ from boresight.types import FloatArray, Sensor
 
 MOST_PROBLEMS = 8  # of one file that are told at once
 EACH, STAMP, TURN, NORTH = "each row", "each stamp", "each turn", "north mark"
-PLACE = ("latitude_deg", "longitude_deg", "height_m")
+PLACE = ("latitude_deg", "longitude_deg", "height_m", MSL)
 SCANS = (EACH, STAMP, TURN, NORTH)
 REQUIRED = {
     "detections": ("t_s", "sensor"),
@@ -65,6 +66,7 @@ class FileMap(TableModel, frozen=True):
     target: str | None = None
     scan: str | None = None
     time_offset_s: float = 0.0
+    geoid_height_m: float | None = None  # of the geoid above the ellipsoid: what heights above mean sea level need
 
 
 class MapTable(TableModel, frozen=True):
@@ -239,6 +241,8 @@ def converted(raw: Raw, of: FileMap, declared: Declaration) -> Table:
     wrong.raise_if_any()
     if of.time_offset_s:
         out["t_s"] = pa.array(out["t_s"].to_numpy(zero_copy_only=False) + of.time_offset_s, from_pandas=True)
+    _heights(out, of, wrong)
+    wrong.raise_if_any()
     _velocities(out)
     keep = np.ones(len(raw), dtype=bool)
     if of.table == "detections":
@@ -320,6 +324,22 @@ def _unwrapped(t: FloatArray, span: float) -> FloatArray:
 
 def _values(out: Mapping[str, Any], name: str) -> FloatArray:
     return np.array(out[name].to_numpy(zero_copy_only=False), dtype=np.float64)
+
+
+def _heights(out: dict[str, Any], of: FileMap, wrong: Problems) -> None:
+    """Heights above mean sea level become heights above the ellipsoid."""
+    if MSL not in out:
+        return
+    if "height_m" not in out:
+        if of.geoid_height_m is None:
+            wrong.note(
+                "its heights are above mean sea level, those of recordings above the WGS84 ellipsoid: "
+                "give --geoid-height-m, the height of the geoid above the ellipsoid there (41 m in Hamburg, "
+                "-33 m in New York)"
+            )
+            return
+        out["height_m"] = pa.array(_values(out, MSL) + of.geoid_height_m, from_pandas=True)
+    out.pop(MSL)
 
 
 def _velocities(out: dict[str, Any]) -> None:
@@ -609,6 +629,7 @@ def write_map(files: Iterable[FileMap], folder: Path | None = None) -> str:
         one: dict[str, Any] = {"path": str(path), "table": of.table, "separator": of.separator, "decimal": of.decimal}
         one |= {k: v for k in ("sensor", "platform", "target", "scan") if (v := getattr(of, k)) is not None}
         one |= {"time_offset_s": of.time_offset_s} if of.time_offset_s else {}
+        one |= {"geoid_height_m": of.geoid_height_m} if of.geoid_height_m is not None else {}
         one |= {"ignore": list(of.ignore)} if of.ignore else {}
         tables.append(write_toml({"file": [one]}).strip())
         tables[-1] += "\n\n[file.columns]\n" + "\n".join(f'{key(k)} = "{v}"' for k, v in of.columns.items())

@@ -30,6 +30,7 @@ class Options:
     time_unit: str | None = None  # of stamps that are numbers
     time_offset: Mapping[str, float] | None = None  # s, to add to the stamps of a sensor, or of "all"
     ignore_columns: Sequence[str] = ()
+    geoid_height: float | None = None  # m above the ellipsoid, for files with heights above mean sea level
     far: bool = False  # platforms and sensors may lie any distance from the site
 
 
@@ -55,6 +56,8 @@ def import_csv(
     named = (("platform", platform), ("truth", truth), ("ignore", ignore))
     maps += [_map_of(path, table, declared, options, notes) for table, path in named if path is not None]
     tables: dict[str, list[Table]] = {name: [] for name in TABLES}
+    if options.geoid_height is not None:
+        maps = [msgspec.structs.replace(of, geoid_height_m=options.geoid_height) for of in maps]
     for of in maps:
         raw = read_raw(Path(of.path), of.separator, of.decimal)
         tables[of.table].append(_shifted(converted(raw, of, declared), of, options))

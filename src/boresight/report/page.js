@@ -321,6 +321,7 @@ if (D.dimensions === 3 && high.length) {
   chart($("height"), {series: by("t", "z", v => v / T), yl: "up, m", x: [0, span], gap: 5, height: 220});
   chart($("side-e"), {series: by("x", "z", v => v / L).map(s => ({...s, label: ""})), yl: "up, m", xl: "east, m", title: "Seen from the south"});
   chart($("side-n"), {series: by("y", "z", v => v / L).map(s => ({...s, label: ""})), yl: "up, m", xl: "north, m", title: "Seen from the west"});
+  $("height").append(make("p", {class: "note"}, `Up is above the horizontal plane through the site, which lies ${sig(D.summary.recording?.site?.height_m ?? 0, 5)} m above the WGS84 ellipsoid (not above mean sea level).`));
   $("height").append(key([["#111", "truth (dashed)", true], ["#2a7f9e", "tracks (a colour each)", true]]));
 } else hide("height-section");
 
@@ -441,6 +442,8 @@ if (own) {
   const wide = names.map(n => { const r = {sensor: n}; let all = 0; for (const o of D.outcome) if (o.sensor === n) { r[o.fate] = (r[o.fate] || 0) + o.rows; all += o.rows; } seen.forEach(f => r[f] ??= 0); r.all = all; return r; });
   $("fates").append(table([["sensor", "sensor", true], ["all", "reports"], ...seen.map(f => [f, f.replaceAll("_", " ")])], wide));
   const why = D.outcome.filter(r => r.reason);
+  for (const r of D.summary.lost || []) $("fates").append(make("p", {class: "note"}, `${r.sensor}: ${r.reports} of ${r.of} reports not used (${r.fate.replaceAll("_", " ")}): ${r.reason}`));
+  for (const line of D.notes || []) $("fates").append(make("p", {class: "note"}, line));
   if (why.length) $("fates").append(make("details", {}, make("summary", {}, "reasons"), table([["sensor", "sensor", true], ["fate", "fate", true], ["reason", "reason", true], ["rows", "reports"]], why)));
 })();
 

@@ -34,7 +34,7 @@ class Mount:
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """Where a fixed sensor stands: site east, north, up (m), and the rotation (3, 3) of its local level to the site's."""
+    """Where a fixed sensor stands: site east, north, up (m), and the rotation (3, 3) from its level axes."""
 
     position: tuple[float, float, float]
     enu_from_local: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
