@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 
@@ -52,6 +53,7 @@ def main() -> None:
     """Run the command line; exit 0 done, 2 bad usage or input (one line on standard error), 1 our fault."""
     try:
         app(sys.argv[1:], exit_on_error=False, print_error=False)
+        sys.stdout.flush()
     except UserError as error:
         _usage(str(error))
     except CycloptsError as error:
@@ -59,6 +61,11 @@ def main() -> None:
     except BrokenPipeError:  # the reader of our output has gone (`| head`)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
+    except OSError as error:  # files are written by io.files, which says which; what is left is standard output
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO) or error.filename is not None:
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _usage(f"standard output cannot be written ({(error.strerror or str(error)).lower()})")
     except KeyboardInterrupt:
         sys.exit(130)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +18,7 @@ from boresight.types import Axes, Component, PlatformTrack, Pose, Sensor, Site
 from boresight.types.sensor import FloatArray
 
 FORETOLD = 2.8  # noise of a pose one stamp ahead against that of a stamp: √7.75, a quadratic over four stamps
+ALWAYS = -1e12  # s: the stamp of a platform at rest, before all others
 SLOPE_WINDOW = 1.0  # s to either side over which a missing velocity is fitted
 _NORTH_LEVEL: FloatArray = ENU_FROM_NED.copy()  # heading north, level: FRD is NED
 
@@ -157,9 +159,13 @@ def pose_track(
 
     Where velocities are missing they are the slope of a least-squares line over the stamps within ±1 s (at least
     the neighbours). With `site`, attitude and north-aligned axes refer to local level *at the platform*, which turns
-    by 0.009° per kilometre from the site's; without, the world is flat. Raises UserError for an empty track, stamps
-    that do not ascend, or a platform with no finite position.
+    by 0.009° per kilometre from the site's; without, the world is flat. One at rest is where its row says at all times.
+    Raises UserError for an empty track, stamps that do not ascend, or a platform with no finite position.
     """
+    if platform.at_rest:
+        always = np.full(len(platform.t), ALWAYS)
+        platform = replace(platform, t=always, t_recv=None, at_rest=False, velocity=np.zeros((len(always), 3)))
+        max_extrapolation = math.inf
     have = np.isfinite(platform.position).all(axis=1) & np.isfinite(platform.t)
     if not have.any():
         raise UserError(f"platform '{platform.id}': no row has a position")
@@ -193,10 +199,10 @@ def sensor_pose(sensor: Sensor, track: PoseTrack | None, t: ArrayLike) -> tuple[
     them: for `site_enu` and `platform_enu` east, north, up; for `body` and `mount` right, forward and minus down.
     The lever arm (FRD) turns with the platform and adds rate × arm to the velocity.
 
-    - `site_enu`: fixed at the site's origin; no lever arm.
+    - `site_enu`: fixed at the site's origin, or at its station with that place's east/north/up; no lever arm.
     - `platform_enu`: at the platform, north-aligned.
-    - `body`, `mount`: on the platform's body, turned by `mount` for the latter. Without a platform the body is the
-      site's north/east/down.
+    - `body`, `mount`: on the platform's body, turned by `mount` for the latter. Without a platform the body is north/
+      east/down of the site or station.
 
     Raises UserError for a platform sensor without a track, for one that needs attitude where there is none, and for
     times that the track does not cover.
@@ -204,7 +210,8 @@ def sensor_pose(sensor: Sensor, track: PoseTrack | None, t: ArrayLike) -> tuple[
     times = np.ascontiguousarray(np.atleast_1d(np.asarray(t, dtype=np.float64)))
     n = len(times)
     if sensor.axes == Axes.SITE_ENU:
-        return np.zeros((n, 3)), np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)).copy()
+        position, turn = _station(sensor, n)
+        return position, np.zeros((n, 3)), np.broadcast_to(turn, (n, 3, 3)).copy()
     if track is None:
         position, velocity, R, rate = _fixed(sensor, n)
     else:
@@ -312,7 +319,9 @@ def add_navigation_noise(
         p = track.sigma_position[np.maximum(np.searchsorted(track.arrived, by, side="right") - 1, 0)]
     if turns:
         newest = np.maximum(np.searchsorted(track.arrived_attitude, by, side="right") - 1, 0)
-        a, ahead = track.sigma_attitude[newest], t > track.t_attitude[newest]
+        a = track.sigma_attitude[newest]
+        if track.max_extrapolation < math.inf:  # else it is at rest, and never foretold
+            ahead = t > track.t_attitude[newest]
     angle2 = (a * np.where(ahead, FORETOLD, 1.0)) ** 2
     far = np.where(np.isnan(z[:, Component.RANGE]), np.inf, z[:, Component.RANGE])
     across = angle2 + (p / np.maximum(far, 1.0)) ** 2
@@ -340,7 +349,15 @@ def _fixed(sensor: Sensor, n: int) -> tuple[FloatArray, FloatArray, FloatArray, 
         raise UserError(
             f"sensor '{sensor.id}' has axes = \"{sensor.axes}\" but there is no track of its platform{name}"
         )
-    return np.zeros((n, 3)), np.zeros((n, 3)), np.broadcast_to(_NORTH_LEVEL, (n, 3, 3)).copy(), np.zeros((n, 3))
+    position, turn = _station(sensor, n)
+    return position, np.zeros((n, 3)), np.broadcast_to(turn @ _NORTH_LEVEL, (n, 3, 3)).copy(), np.zeros((n, 3))
+
+
+def _station(sensor: Sensor, n: int) -> tuple[FloatArray, FloatArray]:
+    """Where a fixed sensor stands (n, 3), and how its local level is turned (3, 3)."""
+    if sensor.station is None:
+        return np.zeros((n, 3)), np.eye(3)
+    return np.tile(np.array(sensor.station.position), (n, 1)), np.array(sensor.station.enu_from_local)
 
 
 def _body_from_mount(sensor: Sensor) -> FloatArray:

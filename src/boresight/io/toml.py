@@ -32,13 +32,17 @@ def toml_of(text: str, where: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise UserError(f"{where}: not valid TOML: {error}") from None
+    except RecursionError:
+        raise UserError(f"{where}: not valid TOML: tables or lists are nested too deeply") from None
 
 
 def convert(value: Any, model: type[T], where: str) -> T:
     """Convert plain values into a TableModel; raises UserError that names the key under `where`."""
-    _check_keys(value, msgspec.inspect.type_info(model), where, "")
     try:
+        _check_keys(value, msgspec.inspect.type_info(model), where, "")
         return msgspec.convert(value, model)
+    except RecursionError:
+        raise UserError(f"{where}: tables or lists are nested too deeply") from None
     except msgspec.ValidationError as error:
         text, _, place = str(error).partition(" - at `$")
         key = place.rstrip("`").lstrip(".")
