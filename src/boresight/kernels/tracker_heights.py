@@ -27,6 +27,7 @@ TOO_WIDE = 1.6  # times that is laid out anew
 ALIKE = 0.1  # variance between heights, as a share of that within them, below which they are one
 CELL = math.sqrt(12.0)  # spacing of heights over the standard deviation of each
 LEAST_MASS = 1e-6
+MUCH_INSIDE = 0.5  # share of a height that must lie where a target may be, for it to stay as it is
 LOG_2PI = math.log(2.0 * math.pi)
 
 
@@ -106,6 +107,7 @@ def settle_heights(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: L
             make_one(tr, i, models)
     if lacks_height(look.z[k], s):
         lay_out(tr, i, s, sensor, look, k, models)
+        keep_within(tr, i, s, sensor, look, k, models)
 
 
 @njit(**PART)
@@ -144,6 +146,57 @@ def inside(low: float, high: float, mean: float, sigma: float) -> float:
     """Return the probability of a Gaussian between two numbers."""
     root = 1.0 / (sigma * math.sqrt(2.0))
     return 0.5 * (math.erf((high - mean) * root) - math.erf((low - mean) * root))
+
+
+@njit(**LEAF)
+def density(u: float) -> float:
+    """Return the standard normal density."""
+    return math.exp(-0.5 * u * u) / math.sqrt(2.0 * math.pi)
+
+
+@njit(**LEAF)
+def keep_within(tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int, models: Models) -> None:
+    """Take from the heights of track `i` what has come to lie where no target of detection `k` may be.
+
+    Where that is much of one, its height becomes mean and variance of the Gaussian cut off there, and the rest of its
+    state follows by regression.
+    """
+    low, high = heights(look, k, s, sensor)
+    changed = False
+    for c in range(tr.mode.shape[1]):
+        variance = tr.mode_P[i, c, 2, 2]
+        if tr.mode[i, c] <= 0.0 or variance <= 0.0:
+            continue
+        sigma, height = math.sqrt(variance), tr.mode_x[i, c, 2]
+        mass = inside(low, high, height, sigma)
+        if mass > MUCH_INSIDE:
+            continue
+        changed = True
+        a, b = (low - height) / sigma, (high - height) / sigma
+        if mass > 1e-6:
+            shift = (density(a) - density(b)) / mass
+            cut = 1.0 + (a * density(a) - b * density(b)) / mass - shift * shift
+        else:  # all of it beyond: to the edge
+            shift, cut = (a if a > 0.0 else b), 0.1
+        cut = min(max(cut, 0.01), 1.0)
+        tr.mode[i, c] *= max(mass, LEAST_MASS)
+        n = tr.x.shape[1]
+        for p in range(n):
+            room_p = tr.mode_P[i, c, p, 2] / sigma
+            tr.mode_x[i, c, p] += room_p * shift
+        for p in range(n):
+            if p != 2:
+                for q in range(p + 1):
+                    if q != 2:
+                        taken = tr.mode_P[i, c, p, 2] * tr.mode_P[i, c, q, 2] / variance * (1.0 - cut)
+                        tr.mode_P[i, c, p, q] -= taken
+                        tr.mode_P[i, c, q, p] = tr.mode_P[i, c, p, q]
+        for p in range(n):
+            tr.mode_P[i, c, p, 2] *= cut
+            tr.mode_P[i, c, 2, p] = tr.mode_P[i, c, p, 2]
+    if changed:
+        give_up_heights(tr, i, models)
+        combine_models(tr, i)
 
 
 @njit(**PART)

@@ -16,7 +16,7 @@ from boresight.kernels.tracker import IntArray, Look, SensorTable, Settings
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
-TOP = 12_000.0  # m: above the site, no aircraft flies higher
+TOP = 14_000.0  # m above the site: hardly an aircraft flies higher
 WIDE = 2.5  # standard deviations of a declared height, on either side
 EARTH = 6.371e6  # m
 
@@ -163,14 +163,16 @@ def height_to_up(look: Look, k: int, s: Settings, height: float) -> float:
 def heights(look: Look, k: int, s: Settings, sensor: SensorTable) -> tuple[float, float]:
     """Return between which heights (m up, world) the target of a detection without elevation may be.
 
-    Five standard deviations of what is declared; else from the ground, or the sensor if that is lower, to where no
-    aircraft flies, within the elevation coverage.
+    Within `WIDE` standard deviations of what is declared and not below the ground, as far as that leaves one of them;
+    else from the ground, or the sensor if that is lower, to where no aircraft flies, within the elevation coverage.
     """
     own, far = look.sensor_position[k, 2], look.z[k, 0]
     reach = 0.999 * far
     if sensor.height_sigma > 0.0:
         middle = height_to_up(look, k, s, sensor.height)
         low, high = middle - WIDE * sensor.height_sigma, middle + WIDE * sensor.height_sigma
+        ground = min(height_to_up(look, k, s, s.site_height), own)
+        low = max(low, min(ground, middle - sensor.height_sigma))
     else:
         low = min(height_to_up(look, k, s, s.site_height), own)
         high = height_to_up(look, k, s, s.site_height + max(TOP, own + 0.25 * TOP))
