@@ -62,6 +62,7 @@ class Tracker:
         dimensions: 2 (tracks in the plane up = 0) or 3.
         poses: the platforms' pose tracks by id; a look uses only the stamps up to its own time of arrival.
         use: indices of the sensors that are used, None for all (sets the window and the planned biases).
+        site_height: of the site above the ellipsoid (m), to which the sensors' prior heights refer.
     """
 
     config: TrackerConfig
@@ -69,13 +70,14 @@ class Tracker:
     dimensions: int
     poses: Mapping[str, PoseTrack] = field(default_factory=dict)
     use: tuple[int, ...] | None = None
+    site_height: float = 0.0
     plan: Plan = field(init=False)
     length: float = field(init=False)  # s, of the window for late looks
     _period: FloatArray = field(init=False)  # (S,) s, declared; NaN: to be found out; 0: not used
 
     def __post_init__(self) -> None:
         used = self.used
-        plan = make_plan(self.config, self.sensors, self.dimensions, used)
+        plan = make_plan(self.config, self.sensors, self.dimensions, used, self.site_height)
         object.__setattr__(self, "plan", plan)
         latencies = [self.sensors[i].latency for i in used] or [0.0]
         length = self.config.window
