@@ -43,6 +43,9 @@ def run_live(
     """
     file = station.file
     inputs = _inputs(station)
+    elements = Elements(pointer, station.elements, {s.id: s.max_age_days for s in file.source})
+    if not inputs and not elements.usable(clock()):
+        raise UserError(f"no [input], and no elements to guide: {elements.told(clock())}: see max_age_days")
     stands = {s.id: Stand(Axes(s.axes), s.offset_enu_m, s.lever_arm_frd_m) for s in file.source}
     carrier = None if file.platform is None else Navigation(file.platform, pointer, file.attitude_coast_s)
     feed = Feed(pointer, stands, carrier)
@@ -52,7 +55,6 @@ def run_live(
     rotator = _rotator(station)
     # half a turn: more is never to be made good
     ahead = np.arange(0.0, min(math.pi / station.mount.azimuth_rate, FURTHEST) + SPACING, SPACING)
-    elements = Elements(pointer, station.elements)
     state, begun = _warm(pointer), clock()
     tick, ticks, latency, total, answers, busy = begun, 0, 0.0, 0.0, 0, time.process_time()
     arrived, shown = math.nan, -math.inf
@@ -84,7 +86,7 @@ def run_live(
                 arrived = math.nan
             if status is not None and pointing is not None and now >= shown + SHOW:
                 shown = now
-                status.write("\r" + status_line(pointer, state, pointing, rotator, carrier))
+                status.write("\r" + status_line(pointer, state, pointing, rotator, carrier) + elements.told(now))
                 status.flush()
             tick = max(tick + 1.0 / file.beam.rate_hz, now)
     except KeyboardInterrupt:
@@ -107,6 +109,8 @@ def run_live(
         "ticks": ticks,
         **told,
         **feed.counts,
+        **elements.counts,
+        "faults": dict(elements.faults),
     }
     return found | ({f"rotator_{k}": v for k, v in rotator.counts.items()} if rotator else {})
 

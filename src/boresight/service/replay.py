@@ -44,7 +44,7 @@ def replay(
     rate, coast = station.file.beam.rate_hz, station.file.attitude_coast_s
     tracks = {p.id: pose_track(p, recording.site) for p in recording.platforms}
     carrier = _carrier(tracks, station.file.platform)
-    elements = Elements(pointer, station.elements)
+    elements = Elements(pointer, station.elements, {s.id: s.max_age_days for s in station.file.source})
     chooser = _Chooser(station, pointer, recording, tracks)
     state = pointer.init()
     first, k = math.nan, 0
