@@ -112,7 +112,7 @@ def run_live(
         **elements.counts,
         "faults": dict(elements.faults),
     }
-    return found | ({f"rotator_{k}": v for k, v in rotator.counts.items()} if rotator else {})
+    return found | (rotator.summary(clock()) if rotator else {})
 
 
 def _rotator(station: Station) -> Rotator | None:
@@ -152,7 +152,7 @@ def status_line(
     )
     best = int(state.guide.clock[3])
     biased = f"  {pointer.guide.sources[best - 1].id} is biased" if best else ""
-    where = "" if rotator is None else ("  rotator away" if rotator.position is None else "  rotator on")
+    where = "" if rotator is None else f"  {rotator.told(p.t)}"
     aim = f"az {math.degrees(p.aim.azimuth):8.3f} el {math.degrees(p.aim.elevation):7.3f}"
     error = f"σ {math.degrees(p.aim.sigma):.3f}° P {p.aim.p_in_beam:.2f}"
     turned = "" if carrier is None else f"  {carrier.name} {carrier.age(p.t):.1f}s"
