@@ -7,10 +7,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from benchmarks.passes import EPOCH, lines_of
 
 from tests.cli.conftest import Run
 from tests.pointing.test_elements import summed
-from tests.pointing.test_passes import EPOCH, lines_of, stationary
+from tests.pointing.test_passes import stationary
 from tests.pointing.test_satellite import tle
 
 

@@ -7,11 +7,11 @@ from datetime import UTC, datetime
 
 import numpy as np
 import pytest
+from benchmarks.passes import lines_of
 
 from boresight.errors import UserError
 from boresight.pointing.elements import RefusedError, epoch_of, read_elements
 from boresight.pointing.satellite import ecef_at
-from tests.pointing.test_passes import lines_of
 
 GOOD = {
     "OBJECT_NAME": "HELIOS", "OBJECT_ID": "2004-049A", "EPOCH": "2025-03-26T05:19:34.116960",

@@ -88,15 +88,13 @@ class Rotator:
         self._listen(now)
         if self.socket is None:
             return None
-        if self.open is None and now - self.asked >= self.period:
-            # the position first: Hamlib's dummy forgets what it has slewed when a new goal comes unasked
-            self._ask("p\n", now)
-            self.asked = now
-            self._listen(now)
-            return self.commanded if self.socket is not None else None
         if self.open is None and self.position is not None and self.fresh:
             self.fresh = False
             self._command(azimuth, elevation, now, path)
+        elif self.open is None and now - self.asked >= self.period:
+            # the position first: Hamlib's dummy forgets what it has slewed when a new goal comes unasked
+            self._ask("p\n", now)
+            self.asked = now
         return self.commanded
 
     def told(self, now: float) -> str:
@@ -119,7 +117,7 @@ class Rotator:
             why = ERRORS.get(self.answer, "an error")
             return f"refuses {_degrees(to)} (RPRT {self.answer}, {why}), stands at {where}"
         off = self.off()
-        if off > self.dead_band and now - self.near_since > SETTLE:
+        if off > self.dead_band and (self.idle or now - self.near_since > SETTLE):
             return f"is {math.degrees(off):.2f}° off and comes no nearer: sent to {_degrees(to)}, stands at {where}"
         return f"{self.odd}" if self.odd else ""
 
@@ -241,6 +239,7 @@ class Rotator:
         try:
             self.socket = socket.socket(family, socket.SOCK_STREAM)
             self.socket.setblocking(False)
+            self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             error = self.socket.connect_ex(where)
         except OSError as failed:
             error = failed.errno or errno.EIO
