@@ -219,6 +219,7 @@ def pointer_for(station: Station, recording: Recording | None = None) -> Pointer
         beam.computation_s + beam.link_s + beam.mechanics_s,
         Choice(file.choice),
         file.stale_s,
+        horizon=station.mount.mask,
     )
 
 

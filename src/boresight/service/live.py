@@ -124,7 +124,7 @@ def _rotator(station: Station) -> Rotator | None:
 
 def steady(carrier: Navigation | None, p: Pointing) -> bool:
     """Return whether the mount's way can be foretold: it stands on the ground and does not search."""
-    return carrier is None and p.mode in (Mode.FUSED, Mode.OWN, Mode.COAST)
+    return carrier is None and p.mode in (Mode.FUSED, Mode.OWN, Mode.COAST, Mode.BELOW_HORIZON)
 
 
 def encode(p: Pointing) -> bytes:

@@ -99,7 +99,7 @@ class Rotator:
 
     def told(self, now: float) -> str:
         """Return what there is to say of the rotator at `now` (s), in a few words."""
-        if self.socket is None or not self.ready:
+        if not self.ready:
             return f"rotator away: {self.why}"
         if self.position is None:
             return f"rotator gives no position{self.odd and f': {self.odd}'}"
@@ -138,11 +138,10 @@ class Rotator:
         return found
 
     def close(self) -> None:
-        """Hang up."""
+        """Hang up; what there was to say of the rotator stays."""
         if self.socket is not None:
             self.socket.close()
         self.socket = None
-        self.why = "closed"
 
     # ------------------------------------------------------------------------------------------------------- commands
     def _command(self, azimuth: float, elevation: float, now: float, path: Path | None) -> None:
