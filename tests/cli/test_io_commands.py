@@ -117,7 +117,7 @@ def test_force_never_destroys_an_input_or_other_files(run: Run, rec: Path, out: 
 
 
 def test_odd_files_are_refused_in_one_line(run: Run, rec: Path, tmp_path: Path) -> None:
-    (tmp_path / "semi.csv").write_text("t_s;sensor;scan;range_m\n1;radar;0;5\n")
+    (tmp_path / "semi.csv").write_text("t_s sensor scan range_m\n1 radar 0 5\n")
     refused(
         run("import", "csv", tmp_path / "semi.csv", "--sensors", tmp_path / "s.toml", "-o", tmp_path / "x"), "commas"
     )

@@ -50,7 +50,7 @@ elevation_deg = 30.0
 pole = "in_face"
 """
 COLUMNS = ["t_s", "t_aim_s", "az_deg", "el_deg", "face_az_deg", "face_el_deg", "az_rate_deg_s", "el_rate_deg_s"]
-COLUMNS += ["sigma_deg", "p_in_beam", "mode"]
+COLUMNS += ["sigma_deg", "p_in_beam", "mount_az_deg", "mount_el_deg", "mode"]
 
 
 @pytest.fixture

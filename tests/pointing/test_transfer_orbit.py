@@ -13,16 +13,10 @@ from boresight.pointing.guide import GuideFilter, GuideSource
 from boresight.types import Site
 
 DEG = math.pi / 180.0
-STATIONS = [
-    Site(lat * DEG, east * DEG, h)
-    for lat, east, h in (
-        (5.25, -52.8, 20.0),
-        (-2.9, 40.2, 20.0),
-        (-31.0, 116.2, 250.0),
-        (40.4, -4.3, 800.0),
-        (-17.7, 177.4, 5.0),
-    )  # fmt: skip
-]
+PLACES = (
+    (5.25, -52.8, 20.0), (-2.9, 40.2, 20.0), (-31.0, 116.2, 250.0), (40.4, -4.3, 800.0), (-17.7, 177.4, 5.0),
+)  # fmt: skip
+STATIONS = [Site(lat * DEG, east * DEG, h) for lat, east, h in PLACES]
 SIGMA = (0.02 * DEG, 0.02 * DEG, 20.0)  # az, el, range
 PRIOR = (0.08 * DEG, 0.08 * DEG, 50.0)
 EVERY, SPAN, LOWEST = 20.0, 5400.0, 5.0 * DEG

@@ -10,6 +10,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from boresight.association import jpda
+from boresight.engine.track import run
 from boresight.io.scans import iter_scans
 from boresight.kernels.tracker import Look
 from boresight.kernels.tracker_joint import mix, shares, take_shares
@@ -19,7 +20,7 @@ from boresight.kernels.tracker_workroom import workroom
 from boresight.metrics.score import score
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.tracking.core import Plan, make_plan
-from boresight.tracking.run import run, track_rows, tracker_for
+from boresight.tracking.run import track_rows, tracker_for
 from boresight.tracking.window import empty_window
 from boresight.types import (
     Axes,
@@ -54,7 +55,7 @@ def look_at(points: np.ndarray) -> Look:
     R[:, 4, 4] = R[:, 5, 5] = 4.0
     R[:, 4, 5] = R[:, 5, 4] = 0.0
     zero = np.zeros((m + 1, 3))
-    return Look(0.0, np.zeros(m), z, R, np.arange(m), zero, zero, np.tile(EYE, (m + 1, 1, 1)))
+    return Look(0.0, np.zeros(m), z, R, np.arange(m), np.full(m, -1), zero, zero, np.tile(EYE, (m + 1, 1, 1)))
 
 
 def plan_of(**errors: float) -> Plan:

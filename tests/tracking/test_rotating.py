@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from boresight.config.scenario import read_scenario
+from boresight.engine.track import run
 from boresight.io.scans import iter_scans
 from boresight.sim.scenario import simulate
 from boresight.tracking.config import TrackerConfig
-from boresight.tracking.run import decision_rows, run, tracker_for
+from boresight.tracking.run import decision_rows, tracker_for
 from boresight.types import FATES, Fate
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "aircraft.toml"

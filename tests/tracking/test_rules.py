@@ -39,13 +39,13 @@ def sensor(name: str, kind: SensorKind = SensorKind.RADAR, **extra: Any) -> Sens
     return Sensor(name, kind, sigma=sigma, **extra)
 
 
-def points(t: float, places: list[list[float]], index: int = 0, first: int = 0) -> Scan:
+def points(t: float, places: list[list[float]], index: int = 0, first: int = 0, sigma: float = 5.0) -> Scan:
     """One look that reports positions (m)."""
     n = len(places)
     z, R = np.full((n, 7), NAN), np.full((n, 7, 7), NAN)
     if n:
         z[:, 4:6] = places
-    R[:, 4:6, 4:6] = 25.0 * np.eye(2)
+    R[:, 4:6, 4:6] = sigma**2 * np.eye(2)
     return Scan(index, t, t, np.full(n, t), z, R, np.arange(first, first + n))
 
 
@@ -55,7 +55,7 @@ def bearings(azimuth: list[float]) -> Look:
     z, R = np.full((m, 7), NAN), np.full((m, 7, 7), NAN)
     z[:, 1], R[:, 1, 1] = azimuth, 1e-4
     zero = np.zeros((m + 1, 3))
-    return Look(0.0, np.zeros(m), z, R, np.arange(m), zero, zero, np.tile(np.eye(3), (m + 1, 1, 1)))
+    return Look(0.0, np.zeros(m), z, R, np.arange(m), np.full(m, -1), zero, zero, np.tile(np.eye(3), (m + 1, 1, 1)))
 
 
 def filled(seed: int, n: int, models: Models | None) -> Tracks:

@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from boresight.engine.track import run
 from boresight.errors import UserError
 from boresight.io.scans import iter_scans
 from boresight.metrics.score import score
 from boresight.tracking.config import SensorErrors, TrackerConfig
-from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
+from boresight.tracking.run import decision_rows, track_rows, tracker_for
 from boresight.tracking.saved import arrays_of_state, snapshot, state_of_arrays
 from boresight.types import FATES, Detections, Fate, Recording, Sensor, SensorKind, Site, TrackRows
 from tests.tracking.conftest import make_recording
@@ -194,7 +195,8 @@ RESUME = """
 import io, sys
 import numpy as np
 from boresight.io.scans import iter_scans
-from boresight.tracking.run import run, track_rows, tracker_for
+from boresight.engine.track import run
+from boresight.tracking.run import track_rows, tracker_for
 from boresight.tracking.saved import state_of_arrays
 from tests.tracking.conftest import make_recording
 from tests.tracking.test_tracker import CONFIG

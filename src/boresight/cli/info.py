@@ -71,7 +71,8 @@ def info(rec: Path, /, *, json: bool = False) -> None:
 
 
 def _about(recording: Recording) -> dict[str, Any]:
-    t, site = recording.detections.t, recording.site
+    t, site = recording.detections.t[recording.usable], recording.site
+    t = t if len(t) else recording.detections.t
     back = np.maximum.accumulate(t) - t
     return {
         "name": recording.name,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,12 @@ def print_json(
     data = {"command": command, "version": __version__, "parameters": parameters, "rows": rows}
     data |= {} if notes is None else {"notes": notes}
     print(json.dumps(finite(data), indent=1, ensure_ascii=False, allow_nan=False))
+
+
+def print_notes(notes: Iterable[str]) -> None:
+    """Print on standard error what the user is to know of the input, a line each."""
+    for note in notes:
+        print(f"boresight: {' '.join(note.split())}", file=sys.stderr)
 
 
 def print_table(

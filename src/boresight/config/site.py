@@ -78,6 +78,7 @@ class SourceTable(TableModel, frozen=True):
     sigma_bias_m: float = 0.0
     correlation_s: float | None = None
     sigma_up_m: float = 10.0
+    latency_s: float = 0.0
     tracks: str | None = None
     track_id: int | None = None
     axes: Literal["site_enu", "platform_enu", "body"] = "site_enu"

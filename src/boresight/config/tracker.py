@@ -28,6 +28,7 @@ TRACKER_KEYS = {
     "static_share": ("static_share", 1.0),
     "static_wander_m2_s": ("static_q", 1.0),
     "stop_floor": ("stop_floor", 1.0),
+    "rest_time_s": ("rest_time", 1.0),
     "start_speed_m_s": ("start_speed", 1.0),
     "targets_at_start": ("targets_at_start", 1.0),
     "apart_m": ("apart", 1.0),
@@ -42,6 +43,7 @@ TRACKER_KEYS = {
     "clutter_memory_looks": ("clutter_memory", 1.0),
     "extent_m": ("extent", 1.0),
     "coast_after_s": ("coast_after", 1.0),
+    "hide_after_s": ("hide_after", 1.0),
     "window_s": ("window", 1.0),
     "smoothing_lag_s": ("smoothing_lag", 1.0),
 }
@@ -83,6 +85,7 @@ class TrackerTable(TableModel, frozen=True):
     static_share: float | None = None
     static_wander_m2_s: float | None = None
     stop_floor: float | None = None
+    rest_time_s: float | None = None
     start_speed_m_s: float | None = None
     targets_at_start: float | None = None
     apart_m: float | None = None
@@ -97,6 +100,7 @@ class TrackerTable(TableModel, frozen=True):
     clutter_memory_looks: float | None = None
     extent_m: float | None = None
     coast_after_s: float | None = None
+    hide_after_s: float | None = None
     window_s: float | None = None
     smoothing_lag_s: float | None = None
 

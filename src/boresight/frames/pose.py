@@ -29,6 +29,7 @@ class PoseTrack:
         id: the platform.
         t: (n,) stamps of positions (s); `position`, `velocity` (n, 3) in the site's ENU (m, m/s).
         measured: (n,) whether the velocity was given (else it is a slope); `hermite` (n - 1,) whether both ends were.
+        arrived: (n,) when each had arrived (s), ascending; `arrived_attitude` (m,) the same of attitudes.
         t_attitude: (m,) stamps of attitudes (s), empty if there are none; `quaternion` (m, 4) of enu_from_body;
             `steps` (m - 1, 3) the turn from each to the next (rad, body axes).
         max_extrapolation: how far before the first and after the last stamp an answer is given (s).
@@ -39,11 +40,13 @@ class PoseTrack:
 
     id: str
     t: FloatArray
+    arrived: FloatArray
     position: FloatArray
     velocity: FloatArray
     measured: NDArray[np.bool_]
     hermite: NDArray[np.bool_]
     t_attitude: FloatArray
+    arrived_attitude: FloatArray
     quaternion: FloatArray
     steps: FloatArray
     max_extrapolation: float
@@ -88,21 +91,23 @@ class PoseTrack:
         return Pose(times, position, velocity, R)
 
     def until(self, t: float) -> PoseTrack:
-        """Return what was known of the platform at time `t` (s): the stamps up to it, and slopes from these alone."""
-        n = int(np.searchsorted(self.t, t, side="right"))
-        m = int(np.searchsorted(self.t_attitude, t, side="right"))
+        """Return what was known at time `t` (s): the stamps that had arrived by then, and slopes from these alone."""
+        n = int(np.searchsorted(self.arrived, t, side="right"))
+        m = int(np.searchsorted(self.arrived_attitude, t, side="right"))
         if n == len(self.t) and m == len(self.t_attitude):
             return self
         velocity = self.velocity[:n]
-        recent = int(np.searchsorted(self.t, t - SLOPE_WINDOW))
+        newest = self.t[n - 1] if n else t
+        recent = int(np.searchsorted(self.t, newest - SLOPE_WINDOW))
         if not self.measured[recent:n].all():
-            first = int(np.searchsorted(self.t, t - 3.0 * SLOPE_WINDOW))
+            first = max(min(int(np.searchsorted(self.t, newest - 3.0 * SLOPE_WINDOW)), recent - 1), 0)
             slopes = kernel.slopes(self.t[first:n], self.position[first:n], SLOPE_WINDOW, recent - first)
             velocity = velocity.copy()
             velocity[recent:] = np.where(self.measured[recent:n, None], velocity[recent:], slopes)
         return replace(
-            self, t=self.t[:n], position=self.position[:n], velocity=velocity, measured=self.measured[:n],
-            hermite=self.hermite[: max(n - 1, 0)], t_attitude=self.t_attitude[:m], quaternion=self.quaternion[:m],
+            self, t=self.t[:n], arrived=self.arrived[:n], position=self.position[:n], velocity=velocity,
+            measured=self.measured[:n], hermite=self.hermite[: max(n - 1, 0)], t_attitude=self.t_attitude[:m],
+            arrived_attitude=self.arrived_attitude[:m], quaternion=self.quaternion[:m],
             steps=self.steps[: max(m - 1, 0)],
         )  # fmt: skip
 
@@ -169,9 +174,11 @@ def pose_track(
         velocity[~measured] = kernel.slopes(t, position, SLOPE_WINDOW, 0)[~measured]
     turned = np.isfinite(platform.ypr).all(axis=1) & np.isfinite(platform.t)
     t_attitude = np.ascontiguousarray(platform.t[turned])
-    quaternion = _attitudes(platform.ypr[turned], t_attitude, t, position, velocity, site)
+    quaternion = _attitudes(platform.ypr[turned], t_attitude, t, position, site)
+    arrived = platform.t if platform.t_recv is None else np.maximum.accumulate(platform.t_recv)
     return PoseTrack(
-        platform.id, t, position, velocity, measured, measured[1:] & measured[:-1], t_attitude, quaternion,
+        platform.id, t, np.ascontiguousarray(arrived[have]), position, velocity, measured,
+        measured[1:] & measured[:-1], t_attitude, np.ascontiguousarray(arrived[turned]), quaternion,
         rotations.steps_between(quaternion), max_extrapolation, max_gap, site,
         _typical(platform.sigma_position), _typical(platform.sigma_attitude),
     )  # fmt: skip
@@ -219,14 +226,22 @@ def sensor_poses(
         return np.ones(len(known), np.bool_), *sensor_pose(sensor, track, t)
     limits = (track.max_gap, track.max_extrapolation)
     good, position, velocity = known_positions(
-        track.t, track.position, track.velocity, track.measured, track.hermite, limits, SLOPE_WINDOW, t, first, known
-    )
+        track.t, track.arrived, track.position, track.velocity, track.measured, track.hermite, limits, SLOPE_WINDOW,
+        t, first, known,
+    )  # fmt: skip
     needed = _needs_attitude(sensor, track)
     if not needed and not track.has_attitude:
         return good, position, velocity, _north_aligned(track, position)
-    turned, R, rate = known_attitudes(track.t_attitude, track.quaternion, track.steps, limits, t, first, known)
+    turned, R, rate = known_attitudes(
+        track.t_attitude, track.arrived_attitude, track.quaternion, track.steps, limits, t, first, known
+    )
     if not needed:  # before the first attitude stamp it does without
-        return good & (turned | (known < track.t_attitude[0])), position, velocity, _north_aligned(track, position)
+        return (
+            good & (turned | (known < track.arrived_attitude[0])),
+            position,
+            velocity,
+            _north_aligned(track, position),
+        )
     return good & turned, *_mounted(sensor, track, position, velocity, R, rate)
 
 
@@ -282,7 +297,7 @@ def add_navigation_noise(
         return covariance
     ahead = np.zeros(len(t), np.bool_)
     if track.has_attitude:
-        newest = np.searchsorted(track.t_attitude, np.broadcast_to(known, t.shape), side="right") - 1
+        newest = np.searchsorted(track.arrived_attitude, np.broadcast_to(known, t.shape), side="right") - 1
         ahead = t > track.t_attitude[np.maximum(newest, 0)]
     angle2 = (a * np.where(ahead, FORETOLD, 1.0)) ** 2
     far = np.where(np.isnan(z[:, Component.RANGE]), np.inf, z[:, Component.RANGE])
@@ -328,16 +343,18 @@ def _north_aligned(track: PoseTrack, position: FloatArray) -> FloatArray:
     return R
 
 
-def _attitudes(
-    ypr: FloatArray, t_attitude: FloatArray, t: FloatArray, p: FloatArray, v: FloatArray, site: Any
-) -> FloatArray:
+def _attitudes(ypr: FloatArray, t_attitude: FloatArray, t: FloatArray, p: FloatArray, site: Any) -> FloatArray:
+    """Return the attitudes (m, 4) against world ENU; local level is that of the place known at each stamp."""
     if not len(t_attitude):
         return np.zeros((0, 4))
     yaw, pitch, roll = (np.ascontiguousarray(ypr[:, i]) for i in range(3))
     R = ENU_FROM_NED @ rotations.matrix_from_ypr(yaw, pitch, roll)
     if site is not None:
-        where, _ = kernel.interpolate_position(t, p, v, np.zeros(max(len(t) - 1, 0), dtype=np.bool_), t_attitude)
-        R = kernel.local_level(where, site.latitude, site.longitude, site.height) @ R
+        i = np.maximum(np.searchsorted(t, t_attitude, side="right") - 1, 0)  # later positions were not known yet
+        before = np.maximum(i - 1, 0)
+        step = np.maximum(t[i] - t[before], 1e-3)[:, None]
+        where = p[i] + (t_attitude - t[i])[:, None] * ((p[i] - p[before]) / step)
+        R = kernel.local_level(np.ascontiguousarray(where), site.latitude, site.longitude, site.height) @ R
     q: FloatArray = rotations.quaternion_from_matrix(np.ascontiguousarray(R))
     return q
 

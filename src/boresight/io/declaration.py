@@ -11,7 +11,7 @@ import numpy as np
 
 from boresight.errors import UserError, did_you_mean
 from boresight.io.toml import TableModel, convert, read_toml, write_toml
-from boresight.types import Axes, Component, Coverage, Mount, Sensor, SensorKind, Site
+from boresight.types import Axes, Component, Coverage, Mount, Reporting, Sensor, SensorKind, Site
 
 DEG = math.pi / 180.0
 SIGMA_KEYS: dict[str, tuple[tuple[Component, ...], float]] = {
@@ -66,6 +66,9 @@ class SensorTable(TableModel, frozen=True):
     p_detection: float = 0.9
     clutter_per_scan: float = 1.0
     coverage: CoverageTable = CoverageTable()
+    reporting: str = "scan"
+    p_wrong_id: float | None = None
+    height_m: tuple[float, float] | None = None
 
 
 class RecordingTable(TableModel, frozen=True):
@@ -133,6 +136,12 @@ def sensor_of(table: SensorTable, where: str) -> Sensor:
     _need(at, "p_detection", table.p_detection, 0 < table.p_detection <= 1, "a probability in (0, 1]")
     clutter = table.clutter_per_scan
     _need(at, "clutter_per_scan", clutter, 0 <= clutter < math.inf, "a mean number of zero or more")
+    wrong, height = table.p_wrong_id, table.height_m
+    if wrong is not None:
+        _need(at, "p_wrong_id", wrong, 0 < wrong < 1, "a probability in (0, 1)")
+    if height is not None:
+        good = math.isfinite(height[0]) and 0 < height[1] < math.inf
+        _need(at, "height_m", list(height), good, "[mean, sigma] with sigma above zero")
     return Sensor(
         id=table.id,
         kind=SensorKind(_word(at, "kind", table.kind, list(SensorKind))),
@@ -145,6 +154,9 @@ def sensor_of(table: SensorTable, where: str) -> Sensor:
         p_detection=table.p_detection,
         clutter_per_scan=clutter,
         coverage=coverage_of(table.coverage, at),
+        reporting=Reporting(_word(at, "reporting", table.reporting, list(Reporting))),
+        p_wrong_id=wrong,
+        height=height,
     )
 
 
@@ -211,6 +223,12 @@ def _sensor_table(sensor: Sensor) -> dict[str, Any]:
         "azimuth_deg": [_deg(a) for a in cover.azimuth],
         "elevation_deg": [_deg(a) for a in cover.elevation],
     }
+    if sensor.reporting is not Reporting.SCAN:
+        table["reporting"] = str(sensor.reporting)
+    if sensor.p_wrong_id is not None:
+        table["p_wrong_id"] = sensor.p_wrong_id
+    if sensor.height is not None:
+        table["height_m"] = list(sensor.height)
     return table
 
 

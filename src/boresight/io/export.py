@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from boresight.errors import UserError
 from boresight.frames.local import geodetic_from_enu
-from boresight.io.paths import ENU, GEODETIC, VELOCITY
-from boresight.io.results import COVARIANCE
-from boresight.types import STATUSES, FloatArray, Site, TrackRows
+from boresight.io.paths import GEODETIC
+from boresight.types import COVARIANCE, ENU, STATUSES, VELOCITY, FloatArray, Site, TrackRows
 
 FORMATS = ("csv", "geojson", "kml")
 

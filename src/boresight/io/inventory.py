@@ -32,7 +32,7 @@ def _sensors(recording: Recording) -> list[dict[str, Any]]:
         hits[scan.sensor].append(len(scan.t))
     rows: list[dict[str, Any]] = []
     for i, sensor in enumerate(recording.sensors):
-        own = d.sensor == i
+        own = (d.sensor == i) & recording.usable
         t = np.array(looks[i])
         steps = np.diff(np.sort(t))
         n = np.array(hits[i], dtype=np.int64)

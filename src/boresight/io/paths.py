@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boresight.io.declaration import DEG
-from boresight.io.table import NUMBER, TEXT, Table, nullable
-from boresight.types import FloatArray, Ignore, PlatformTrack, Site, Truth
+from boresight.io.table import NUMBER, TEXT, Table, in_unit, nullable
+from boresight.types import ENU, VELOCITY, FloatArray, Ignore, PlatformTrack, Site, Truth
 
-ENU = ("east_m", "north_m", "up_m")
 GEODETIC = ("latitude_deg", "longitude_deg", "height_m")
-VELOCITY = ("ve_m_s", "vn_m_s", "vu_m_s")
 YPR = ("yaw_deg", "pitch_deg", "roll_deg")
 PLATFORM_SCHEMA: dict[str, str] = {
     "t_s": NUMBER,
+    "t_recv_s": NUMBER,
     "platform": TEXT,
     **dict.fromkeys((*GEODETIC, *ENU, *YPR, *VELOCITY, "sigma_position_m", "sigma_attitude_deg"), NUMBER),
 }
@@ -34,15 +33,24 @@ def platforms_of(table: Table, site: Site, dimensions: int) -> tuple[PlatformTra
     position = _platform_positions(table, site, dimensions)
     velocity = _columns(table, VELOCITY)
     ypr = _columns(table, YPR) * DEG
-    sigma = table.numbers("sigma_position_m")
-    turn = table.numbers("sigma_attitude_deg") * DEG
+    sigma = table.checked("sigma_position_m")
+    turn = table.checked("sigma_attitude_deg") * DEG
+    arrived = table.numbers("t_recv_s")
     for name, values in (("sigma_position_m", sigma), ("sigma_attitude_deg", turn)):
         table.fail_where(values <= 0, f"{name} is not above zero; leave it null when not known")
+    known = np.asarray(np.isfinite(position).all(axis=1))  # without a position the rest of a row is of no use
     out = []
-    for name, rows, t in _by_name(table, "platform"):
+    for name, every, stamps in _by_name(table, "platform"):
+        rows, t = every[known[every]], stamps[known[every]]
+        if len(rows) == 0:
+            table.fail(None, f"no row of platform '{name}' has a position")
         if np.isnan(ypr[rows, 1:]).all():  # a heading alone: the platform is taken as level
             ypr[rows, 1:] = np.where(np.isnan(ypr[rows, :1]), np.nan, 0.0)
-        out.append(PlatformTrack(name, t, position[rows], velocity[rows], ypr[rows], sigma[rows], turn[rows]))
+        columns = (position[rows], velocity[rows], ypr[rows], sigma[rows], turn[rows])
+        came = arrived[rows]
+        out.append(
+            PlatformTrack(name, t, *columns, None if np.isnan(came).all() else np.where(np.isnan(came), t, came))
+        )
     return tuple(out)
 
 
@@ -56,15 +64,17 @@ def _platform_positions(table: Table, site: Site, dimensions: int) -> FloatArray
     for name in GEODETIC[:2]:
         if name not in table:
             table.fail(None, f"column '{name}' is missing")
-    latitude, longitude = (table.numbers(n, required=True) for n in GEODETIC[:2])
-    table.fail_where(np.abs(latitude) > 90.0, "latitude_deg is {}, outside -90 .. 90", latitude)
+    latitude, longitude = (table.checked(n, required=True) for n in GEODETIC[:2])
     flat = dimensions == 2
     if "height_m" not in table and not flat:
         table.fail(None, "column 'height_m' is missing")
-    height = table.numbers("height_m", required=not flat, default=site.height)
+    height = table.checked("height_m", required=not flat, default=site.height)
     from boresight.frames.local import enu_from_geodetic  # compiled code: loaded only where it is needed
 
-    position = np.stack(enu_from_geodetic(latitude * DEG, longitude * DEG, height, site), axis=1)
+    position = np.full((len(table), 3), np.nan)
+    known = np.isfinite(latitude) & np.isfinite(longitude) & np.isfinite(height)
+    lat, lon, up = latitude[known] * DEG, longitude[known] * DEG, height[known]
+    position[known] = np.stack(enu_from_geodetic(lat, lon, up, site), axis=1)
     if flat:  # the plane of the tracks: neither antenna height nor the Earth's curvature is in it
         position[:, 2] = 0.0
     return position
@@ -95,7 +105,7 @@ def _positions(table: Table, dimensions: int) -> FloatArray:
 
 
 def _columns(table: Table, names: Sequence[str]) -> FloatArray:
-    return np.stack([table.numbers(n) for n in names], axis=1)
+    return np.stack([table.checked(n) for n in names], axis=1)
 
 
 def _by_name(table: Table, column: str) -> list[tuple[str, NDArray[np.int64], FloatArray]]:
@@ -119,11 +129,13 @@ def platform_columns(platforms: Sequence[PlatformTrack]) -> dict[str, Any]:
         "t_s": np.concatenate([p.t for p in platforms]),
         "platform": [p.id for p in platforms for _ in p.t],
     }
+    if any(p.t_recv is not None for p in platforms):
+        out["t_recv_s"] = np.concatenate([p.t if p.t_recv is None else p.t_recv for p in platforms])
     out |= _split(ENU, np.concatenate([p.position for p in platforms]), always=True)
-    out |= _split(YPR, np.concatenate([p.ypr for p in platforms]) / DEG)
+    out |= _split(YPR, in_unit(np.concatenate([p.ypr for p in platforms]), DEG))
     out |= _split(VELOCITY, np.concatenate([p.velocity for p in platforms]))
     out |= _split(("sigma_position_m",), np.concatenate([p.sigma_position for p in platforms])[:, None])
-    out |= _split(("sigma_attitude_deg",), np.concatenate([p.sigma_attitude for p in platforms])[:, None] / DEG)
+    out |= _split(("sigma_attitude_deg",), in_unit(np.concatenate([p.sigma_attitude for p in platforms])[:, None], DEG))
     return out
 
 

@@ -50,8 +50,11 @@ def assemble(
     where: str = "",
 ) -> Recording:
     """Check tables against the declaration and return the recording; raises UserError."""
-    rows, duplicates = det.detections_of(detections, declared.sensors)
     platforms = paths.platforms_of(platform, declared.site, declared.dimensions) if platform is not None else ()
+    true = paths.truths_of(truth, declared.dimensions) if truth is not None else ()
+    others = [(f"platform '{p.id}'", float(p.t[0]), float(p.t[-1])) for p in platforms]
+    others += [(f"target '{p.target}' of the truth", float(p.t[0]), float(p.t[-1])) for p in true]
+    rows, duplicates, refused = det.detections_of(detections, declared.sensors, others)
     check_navigation(declared.sensors, rows, platforms, where)
     return Recording(
         name=declared.name,
@@ -60,9 +63,13 @@ def assemble(
         sensors=declared.sensors,
         detections=rows,
         platforms=platforms,
-        truth=paths.truths_of(truth, declared.dimensions) if truth is not None else (),
+        truth=true,
         ignore=paths.ignored_of(ignore) if ignore is not None else (),
         duplicates=duplicates,
+        refused=refused,
+        notes=tuple(
+            note for table in (detections, platform, truth, ignore) if table is not None for note in table.notes
+        ),
     )
 
 
@@ -81,9 +88,9 @@ def check_navigation(
                 f"{near}; add its rows to platform.parquet"
             )
         turned = sensor.axes in (Axes.BODY, Axes.MOUNT) or any(sensor.mount.lever_arm)
-        if turned and np.isnan(by_id[sensor.platform].ypr[:, 0]).any():
+        if turned and np.isnan(by_id[sensor.platform].ypr[:, 0]).all():
             raise UserError(
-                f"{where}: platform '{sensor.platform}' has rows without yaw_deg, which sensor '{sensor.id}' needs "
+                f"{where}: platform '{sensor.platform}' has no row with yaw_deg, which sensor '{sensor.id}' needs "
                 f"(axes = '{sensor.axes}', lever arm {list(sensor.mount.lever_arm)})"
             )
 

@@ -8,23 +8,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boresight.errors import UserError, did_you_mean
-from boresight.types import Detections, FloatArray, Recording, Scan
+from boresight.types import Detections, FloatArray, Recording, Scan, address_code
 
 
 def iter_scans(recording: Recording, sensors: Sequence[str] | None = None) -> Iterator[Scan]:
     """Yield every scan in order of arrival (all sensors, or those with the given ids).
 
-    Rows that share (sensor, scan) are one scan, wherever they stand; it arrives with its last row, duplicates left
-    out. Looks that saw nothing are yielded with their rows in `empty_rows`. Raises UserError for an unknown sensor.
+    Rows that share (sensor, scan) are one scan, wherever they stand; it arrives with its last row, duplicates and
+    refused rows left out. Looks that saw nothing are yielded with their rows in `empty_rows`. Raises UserError for an
+    unknown sensor.
     """
     d = recording.detections
-    rows = np.flatnonzero(~recording.duplicates & np.isin(d.sensor, selected(recording, sensors)))
+    rows = np.flatnonzero(~recording.duplicates & recording.usable & np.isin(d.sensor, selected(recording, sensors)))
     if len(rows) == 0:
         return
     _, group = np.unique(np.stack([d.sensor[rows], d.scan[rows]], axis=1), axis=0, return_inverse=True)
     last = np.zeros(int(group.max()) + 1, dtype=np.int64)
     np.maximum.at(last, group, rows)
-    rows = rows[np.lexsort((rows, last[group]))]
+    arrival = np.full(len(last), -np.inf)
+    np.maximum.at(arrival, group, d.t_recv[rows])
+    rows = rows[np.lexsort((rows, last[group], arrival[group]))]
     yield from _cut(d, rows, _starts(d, rows))
 
 
@@ -48,6 +51,7 @@ def _starts(d: Detections, rows: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _cut(d: Detections, rows: NDArray[np.int64], starts: NDArray[np.int64]) -> Iterator[Scan]:
     z, t, covariance = d.z[rows], d.t[rows], covariances(d, rows)
+    address = addresses(d, rows)
     empty: NDArray[np.bool_] = np.all(np.isnan(z), axis=1)
     first = starts[:-1]
     n_empty = np.add.reduceat(empty.astype(np.int64), first)
@@ -64,7 +68,15 @@ def _cut(d: Detections, rows: NDArray[np.int64], starts: NDArray[np.int64]) -> I
             here = empty[begin:end]
             empty_rows = tuple(rows[begin:end][here].tolist())
             part = begin + np.flatnonzero(~here)
-        yield Scan(sensor, t_look, t_recv, t[part], z[part], covariance[part], rows[part], empty_rows)
+        own = None if address is None else address[part]
+        yield Scan(sensor, t_look, t_recv, t[part], z[part], covariance[part], rows[part], empty_rows, own)
+
+
+def addresses(d: Detections, rows: NDArray[np.int64]) -> NDArray[np.int64] | None:
+    """Return the codes of the given rows' `source_id`, -1 where they have none; None where no row has one."""
+    if d.source_id is None:
+        return None
+    return np.array([address_code(d.source_id[row]) for row in rows.tolist()], np.int64)
 
 
 def covariances(d: Detections, rows: NDArray[np.int64]) -> FloatArray:

@@ -90,6 +90,11 @@ def _is_table(value: Any) -> bool:
     return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))
 
 
+def key(name: str) -> str:
+    """Return a key as TOML writes it: quoted where it holds more than letters, digits, - and _."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _inline(name)
+
+
 def _inline(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
@@ -99,5 +104,5 @@ def _inline(value: Any) -> str:
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
         return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in escaped) + '"'
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{k} = {_inline(v)}" for k, v in value.items()) + " }"
+        return "{ " + ", ".join(f"{key(k)} = {_inline(v)}" for k, v in value.items()) + " }"
     return "[" + ", ".join(_inline(v) for v in value) + "]"

@@ -26,6 +26,9 @@ VISIBLE, HIDDEN, STATIC, NOTHING = 0, 1, 2, 3
 # codes of what became of a detection
 UNASSOCIATED, UPDATED, INITIATED, OUTSIDE, GATED = 0, 1, 2, 3, 4
 AZIMUTH_BINS = 120
+NO_ADDRESS = -1
+LAST, INTERVAL, ADDRESS, VOTES = 0, 1, 2, 3  # columns of `Tracks.spoken`
+SPACING, EVERY, PASSED, MESSAGES = 0, 1, 2, 3  # columns of `Tracks.pace`
 
 
 class Tracks(NamedTuple):
@@ -50,6 +53,10 @@ class Tracks(NamedTuple):
     seen_range: FloatArray  # (n_sensors,) m, longest range so far (stands in for a coverage without end)
     witness: FloatArray  # (cap, w, 2) by w sensors, probabilities, -1 before its first look: it reports this
     # target at all; were the track nothing, something else would stand in its direction
+    spoken: FloatArray  # (cap, u, 4) of u sensors that give addresses or report one target a message: time of the last
+    # message (s), mean time between two (s, 0: unknown), address (NO_ADDRESS: none yet), how many more had it than not
+    pace: FloatArray  # (n_sensors, 4) of such sensors: mean time between two messages, and between two of one target
+    # (s, 0: unknown); the time and the messages in the former
     mode: PerModel = None  # (cap, 2) probabilities of the models of motion, and
     mode_x: PerModel = None  # (cap, 2, n) their states, of which x and P are the moments
     mode_P: PerModel = None  # (cap, 2, n, n)
@@ -63,6 +70,7 @@ class Look(NamedTuple):
     z: FloatArray  # (m, 7)
     R: FloatArray  # (m, 7, 7)
     row: IntArray  # (m,)
+    address: IntArray  # (m,) code of the `source_id`, NO_ADDRESS where there is none
     sensor_position: FloatArray  # (m + 1, 3), the last for the look itself
     sensor_velocity: FloatArray  # (m + 1, 3)
     enu_from_sensor: FloatArray  # (m + 1, 3, 3)
@@ -93,6 +101,10 @@ class SensorTable(NamedTuple):
     witness: int  # its place in `Tracks.witness`, -1 for none
     gate_width: float  # rad, azimuth that the gate of a track covers whose place is known
     joint: bool  # tracks share its detections (JPDA) instead of taking one each
+    single: bool  # a look is a message of one target and says nothing of others
+    interval: float  # s, declared mean time between two messages of one target; 0: not declared
+    spoken: int  # its place in `Tracks.spoken`, -1 for none
+    wrong_id: float  # probability that an address is not the target's own
 
 
 class Settings(NamedTuple):
@@ -109,7 +121,8 @@ class Settings(NamedTuple):
     static_share: float  # of a new track's existence
     static_q: float  # m²/s
     stop_floor: float  # least weight of "it does not move": a target may stop
-    start_speed: float  # m/s, of what stood and sets off; 0: nothing does
+    rest_time: float  # s, mean time for which what does not move stays so
+    start_speed: float  # m/s, of what stood and sets off, per axis
     targets_at_start: float  # expected number of targets before the first look
     doubt: float  # least existence with which a track competes for detections
     delete_below: float
@@ -125,6 +138,7 @@ class Settings(NamedTuple):
     clutter_memory: float  # looks
     blob: float  # m, the largest resolution of the ranging sensors in use
     blob_share: float  # probability that a second bearing beside a shown track is a second target in its blob
+    hide_after: float  # s without a hit after which a track is shown no more
     extent: float  # m, per axis: from the point of a target that is reported to the one that is meant; in rows
 
 

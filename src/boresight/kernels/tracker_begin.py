@@ -25,6 +25,7 @@ from boresight.kernels.tracker import (
     Settings,
     Tracks,
 )
+from boresight.kernels.tracker_messages import find_owned, forget_messages, note_message, part_told
 from boresight.kernels.tracker_models import begin_models
 from boresight.kernels.tracker_place import Places, fix_sensitivity
 from boresight.kernels.tracker_state import apply_update, innovation, linearise
@@ -58,8 +59,12 @@ def begin(
     pooled = tr.bank
     if extras is not None:
         pooled = pooled_constants(tr, s)
-    expected = tr.undetected[0] * sensor.p_detection
-    tr.undetected[0] += s.birth_rate - expected
+    part = part_told(tr, sensor, len(look.dt))
+    expected = tr.undetected[0] * sensor.p_detection * part
+    tr.undetected[0] += s.birth_rate * part - expected
+    owned = np.zeros(len(look.dt))
+    if sensor.spoken >= 0:
+        find_owned(tr, sensor, look, owned)
     for k in range(len(look.dt)):
         if row_of_col[k] >= 0 or not at.there[k]:
             continue
@@ -97,7 +102,8 @@ def begin(
         if extras is not None and sensor.registers:
             apply_constants(tr, i, s, look, k, sensor, fix, J, mask, room)
         density = tr.clutter[sensor.number, AZIMUTH_BINS]
-        born = max(expected / (expected + density), 5.0 * s.delete_below)
+        new = expected * (sensor.wrong_id if owned[k] > 0.0 else 1.0)
+        born = max(new / (new + density), 5.0 * s.delete_below)
         w = tr.weight[i]
         w[VISIBLE] = born * (1.0 - s.static_share)
         w[HIDDEN] = 0.0
@@ -105,6 +111,8 @@ def begin(
         w[NOTHING] = 1.0 - born
         fate[k] = INITIATED
         owner[k] = look.row[k]
+        if sensor.spoken >= 0:
+            note_message(tr, i, sensor, look.t + look.dt[k], look.address[k])
         if math.isfinite(look.z[k, 3]):
             condition_on_rate(tr, i, s, sensor, look, k, room)
         if models is not None:
@@ -130,6 +138,7 @@ def new_track(tr: Tracks, s: Settings, look: Look, k: int, heard: int) -> int:
     for a in range(tr.witness.shape[1]):
         for b in range(2):
             tr.witness[i, a, b] = -1.0
+    forget_messages(tr, i)
     tr.birth[i] = look.row[k]
     tr.heard[i] = heard
     tr.life[i, 0] = look.t + look.dt[k]

@@ -88,7 +88,9 @@ def learn_clutter(
         if i < 0 and claims[k] > 0:
             share = 0.0
         elif i >= 0:
-            share = tr.weight[i, NOTHING] + tr.weight[i, STATIC] if sensor.ranging else tr.weight[i, NOTHING]
+            share = tr.weight[i, NOTHING]
+            if sensor.ranging and not sensor.single:  # what stands and does not send is fixed clutter
+                share += tr.weight[i, STATIC]
         if not math.isnan(look.z[k, 1]):
             known[azimuth_bin(look.z[k, 1])] += forget * share
         known[AZIMUTH_BINS] += forget * share

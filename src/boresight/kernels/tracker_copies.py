@@ -12,7 +12,7 @@ from boresight.kernels.options import BARE, LEAF
 from boresight.kernels.tracker import IntArray, Models, PerModel, Tracks
 from boresight.types.sensor import FloatArray
 
-WHOLE = ("live", "time", "last_look", "clutter", "bank", "undetected", "seen_range")
+WHOLE = ("live", "time", "last_look", "clutter", "bank", "undetected", "seen_range", "pace")
 EACH = (
     "birth",
     "x",
@@ -25,6 +25,7 @@ EACH = (
     "beside",
     "told",
     "witness",
+    "spoken",
     "mode",
     "mode_x",
     "mode_P",
@@ -46,6 +47,7 @@ class Copies(NamedTuple):
     bank: FloatArray  # (C, k, k + 1)
     undetected: FloatArray  # (C, 1)
     seen_range: FloatArray  # (C, S)
+    pace: FloatArray  # (C, S, 4)
     # of each track in each copy
     birth: IntArray  # (N,)
     x: FloatArray  # (N, n)
@@ -58,6 +60,7 @@ class Copies(NamedTuple):
     beside: IntArray  # (N,)
     told: FloatArray  # (N, k, k + 1)
     witness: FloatArray  # (N, w, 2)
+    spoken: FloatArray  # (N, u, 4)
     mode: PerModel = None  # (N, 2)
     mode_x: PerModel = None  # (N, 2, n)
     mode_P: PerModel = None  # (N, 2, n, n)
@@ -113,6 +116,7 @@ def keep(copies: Copies, tr: Tracks, t: float, number: int, models: Models | Non
     put2(copies.bank[c], 0, tr.bank, 0, len(tr.bank))
     put1(copies.undetected[c], 0, tr.undetected, 0, len(tr.undetected))
     put1(copies.seen_range[c], 0, tr.seen_range, 0, len(tr.seen_range))
+    put2(copies.pace[c], 0, tr.pace, 0, len(tr.pace))
     put1(copies.birth, a, tr.birth, 0, n)
     put2(copies.x, a, tr.x, 0, n)
     put3(copies.P, a, tr.P, 0, n)
@@ -124,6 +128,7 @@ def keep(copies: Copies, tr: Tracks, t: float, number: int, models: Models | Non
     put1(copies.beside, a, tr.beside, 0, n)
     put3(copies.told, a, tr.told, 0, n)
     put3(copies.witness, a, tr.witness, 0, n)
+    put3(copies.spoken, a, tr.spoken, 0, n)
     if models is not None:
         put_models(copies, a, tr, 0, n)
 
@@ -140,6 +145,7 @@ def restore(copies: Copies, c: int, tr: Tracks, models: Models | None) -> None:
     put2(tr.bank, 0, copies.bank[c], 0, len(tr.bank))
     put1(tr.undetected, 0, copies.undetected[c], 0, len(tr.undetected))
     put1(tr.seen_range, 0, copies.seen_range[c], 0, len(tr.seen_range))
+    put2(tr.pace, 0, copies.pace[c], 0, len(tr.pace))
     put1(tr.birth, 0, copies.birth, a, n)
     put2(tr.x, 0, copies.x, a, n)
     put3(tr.P, 0, copies.P, a, n)
@@ -151,6 +157,7 @@ def restore(copies: Copies, c: int, tr: Tracks, models: Models | None) -> None:
     put1(tr.beside, 0, copies.beside, a, n)
     put3(tr.told, 0, copies.told, a, n)
     put3(tr.witness, 0, copies.witness, a, n)
+    put3(tr.spoken, 0, copies.spoken, a, n)
     if models is not None:
         put_models(tr, 0, copies, a, n)
 

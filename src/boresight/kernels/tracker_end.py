@@ -21,6 +21,7 @@ from boresight.kernels.tracker import (
 )
 from boresight.kernels.tracker_begin import save_lesson
 from boresight.kernels.tracker_copies import put1, put2, put3, put_models
+from boresight.kernels.tracker_messages import are_two, take_over
 
 
 @njit(**PART)
@@ -114,6 +115,7 @@ def move(tr: Tracks, i: int, to: int, models: Models | None) -> None:
     put3(tr.anchor_P, to, tr.anchor_P, i, 1)
     put3(tr.told, to, tr.told, i, 1)
     put3(tr.witness, to, tr.witness, i, 1)
+    put3(tr.spoken, to, tr.spoken, i, 1)
     if models is not None:
         put_models(tr, to, tr, i, 1)
 
@@ -131,6 +133,7 @@ def merge(tr: Tracks, s: Settings, keep: NDArray[np.bool_], extras: Extras) -> N
             if keep[j] and are_one(tr, i, j, s):
                 weaker = j if rank(tr, i) >= rank(tr, j) else i
                 keep[weaker] = False
+                take_over(tr, i + j - weaker, weaker)
                 if extras is not None:
                     save_lesson(tr, weaker, s)
 
@@ -141,6 +144,8 @@ def are_one(tr: Tracks, i: int, j: int, s: Settings) -> bool:
     if tr.life[i, 3] < 2.0 or tr.life[j, 3] < 2.0:
         return False
     if tr.heard[i] == 0 or tr.heard[j] == 0:  # begun because bearings tell it from its neighbour
+        return False
+    if are_two(tr, i, j):
         return False
     gap = 0.0
     speed = 0.0

@@ -12,6 +12,7 @@ from boresight.kernels.options import LEAF, PART
 from boresight.kernels.registration import TIME
 from boresight.kernels.tracker import GATED, UNASSOCIATED, IntArray, Look, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_clutter import log_densities
+from boresight.kernels.tracker_messages import find_owned, with_address
 from boresight.kernels.tracker_place import Places, fix_sensitivity
 from boresight.kernels.tracker_state import components, existence, innovation, linearise, log_determinant
 from boresight.kernels.tracker_workroom import Workroom
@@ -103,6 +104,9 @@ def gate_all(
     near = np.full(m, np.inf)
     log_density = np.empty(m)
     most = log_densities(tr, s, sensor, look, log_density)
+    owned = np.zeros(m)
+    if sensor.spoken >= 0:
+        find_owned(tr, sensor, look, owned)
     spread, dt_high = spread_of(s, sensor, look, usable, at, room)
     near_only = m > 0 and math.isfinite(spread)
     order, east, north = np.arange(m), near, near
@@ -156,6 +160,8 @@ def gate_all(
             if used == start[i]:
                 log_hit, log_miss = math.log(there * p_d[i]), math.log(1.0 - there * p_d[i])
             loglik[used] = -0.5 * (nis + log_determinant(c, room) + c * LOG_2PI) - log_density[k]
+            if sensor.spoken >= 0:
+                loglik[used] = with_address(tr, i, sensor, look.address[k], owned[k], loglik[used], nis, p_d[i])
             cost[used] = log_miss - (log_hit + loglik[used])
             used += 1
     start[n_tracks] = used

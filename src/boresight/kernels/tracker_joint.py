@@ -93,7 +93,7 @@ def take_shares(
         mix(tr, i, s, sensor, look, room, start, column, share, visible, models)
     weigh(tr, i, math.log(visible), math.log(still), temper)
     if own >= 0:
-        note_hit(tr, i, s, sensor, look.t + look.dt[own], moves, models)
+        note_hit(tr, i, s, sensor, look.t + look.dt[own], moves)
 
 
 @njit(**PART)

@@ -13,8 +13,9 @@ from boresight.kernels.tracker import IntArray, Look, SensorTable
 from boresight.types.sensor import FloatArray
 
 NO_SENSOR = -1  # an arrival without a look: time has gone on
+NO_LOOK = -2  # no arrival either: only the rows due until then are wanted
 PER_LOOK = ("t", "arrival", "sensor", "number")  # fields of `Looks`, and what one place in each stands for
-PER_DETECTION = ("dt", "z", "R", "row")
+PER_DETECTION = ("dt", "z", "R", "row", "address")
 PER_POSE = ("position", "velocity", "axes")
 
 
@@ -33,6 +34,7 @@ class Looks(NamedTuple):
     z: FloatArray  # (M, 7)
     R: FloatArray  # (M, 7, 7)
     row: IntArray  # (M,)
+    address: IntArray  # (M,)
     position: FloatArray  # (M + L, 3) m
     velocity: FloatArray  # (M + L, 3) m/s
     axes: FloatArray  # (M + L, 3, 3) enu_from_sensor
@@ -44,7 +46,7 @@ def look_at(looks: Looks, k: int) -> Look:
     a, b = looks.first[k], looks.first[k + 1]
     p, q = a + k, b + k + 1
     return Look(
-        looks.t[k], looks.dt[a:b], looks.z[a:b], looks.R[a:b], looks.row[a:b],
+        looks.t[k], looks.dt[a:b], looks.z[a:b], looks.R[a:b], looks.row[a:b], looks.address[a:b],
         looks.position[p:q], looks.velocity[p:q], looks.axes[p:q],
     )  # fmt: skip
 
@@ -80,6 +82,10 @@ def sensor_at(sensors: Any, i: int) -> SensorTable:
         sensors.witness[i],
         sensors.gate_width[i],
         sensors.joint[i],
+        sensors.single[i],
+        sensors.interval[i],
+        sensors.spoken[i],
+        sensors.wrong_id[i],
     )
 
 
@@ -87,15 +93,15 @@ def no_looks() -> Looks:
     """Return none."""
     return Looks(
         np.zeros(0), np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0),
-        np.zeros((0, 7)), np.zeros((0, 7, 7)), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)),
-        np.zeros((0, 3, 3)),
+        np.zeros((0, 7)), np.zeros((0, 7, 7)), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)),
+        np.zeros((0, 3)), np.zeros((0, 3, 3)),
     )  # fmt: skip
 
 
-def moment(t_recv: float) -> Looks:
-    """Return an arrival (s) without a look."""
+def moment(t_recv: float, sensor: int = NO_SENSOR) -> Looks:
+    """Return a time (s) without a look: of an arrival (`NO_SENSOR`), or at which rows are wanted (`NO_LOOK`)."""
     return no_looks()._replace(
-        t=np.full(1, np.nan), arrival=np.full(1, t_recv), sensor=np.full(1, NO_SENSOR), number=np.zeros(1, np.int64),
+        t=np.full(1, np.nan), arrival=np.full(1, t_recv), sensor=np.full(1, sensor), number=np.zeros(1, np.int64),
         first=np.zeros(2, np.int64), position=np.zeros((1, 3)), velocity=np.zeros((1, 3)), axes=np.zeros((1, 3, 3)),
     )  # fmt: skip
 

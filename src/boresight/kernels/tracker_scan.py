@@ -28,6 +28,7 @@ from boresight.kernels.tracker_clutter import learn_clutter
 from boresight.kernels.tracker_end import end_and_merge, show
 from boresight.kernels.tracker_gate import gate_all
 from boresight.kernels.tracker_joint import shares, take_shares
+from boresight.kernels.tracker_messages import in_message, note_message, note_pace
 from boresight.kernels.tracker_place import covered, places_of, within
 from boresight.kernels.tracker_predict import predict_all
 from boresight.kernels.tracker_split import begin_beside, keep_beside, unplaced
@@ -63,8 +64,12 @@ def scan_step(
     screen(look, sensor, usable, fate, owner, nis_of)
     at = places_of(look, s, sensor, usable)
     p_d = np.zeros(n_tracks)
+    temper, elapsed = independence(tr, sensor, look)
+    note_pace(tr, sensor, elapsed, m)
     for i in range(n_tracks):
         p_d[i] = detection_probability(tr.x[i], s.d, look, sensor)
+        if sensor.single:
+            p_d[i] *= in_message(tr, i, sensor, m)
     start, column, cost, distance, loglik = gate_all(tr, s, sensor, look, usable, at, p_d, room, fate, owner, nis_of)
     col_of_row = np.full(n_tracks, -1, np.int64)
     assign_sparse(start, column, cost, m, col_of_row)
@@ -74,7 +79,6 @@ def scan_step(
             row_of_col[col_of_row[i]] = i
     claims, rivals = np.zeros(m, np.int64), np.zeros(m)
     count_claims(tr, sensor, p_d, start, column, claims, rivals)
-    temper, elapsed = independence(tr, sensor, look)
     by_chance = recall(tr, sensor, elapsed)
     share = loglik
     if extras is not None and (sensor.joint or (s.blob_share > 0.0 and not sensor.ranging and unplaced(tr))):
@@ -106,10 +110,12 @@ def scan_step(
             fate[k] = UPDATED
             owner[k] = tr.birth[i]
             nis_of[k] = distance[e]
+            if sensor.spoken >= 0:
+                note_message(tr, i, sensor, look.t + look.dt[k], look.address[k])
         if confirms:
             corroborate(tr, i, sensor, p_d[i], found == 1, rival, temper, by_chance)
             if k >= 0:
-                note_hit(tr, i, s, sensor, look.t + look.dt[k], False, models)
+                note_hit(tr, i, s, sensor, look.t + look.dt[k], False)
             continue
         blob = merged(tr, i, s, sensor, col_of_row) if k < 0 else -1
         if blob >= 0:
@@ -211,7 +217,7 @@ def pass_over(tr: Tracks, i: int, s: Settings, sensor: SensorTable, t: float, te
         for a in range(4):
             tr.weight[i, a] = 0.0
         tr.weight[i, NOTHING] = 1.0
-    elif tr.life[i, 3] < 2.0 and tr.heard[i] == 1 << (sensor.number % 62):
+    elif not sensor.single and tr.life[i, 3] < 2.0 and tr.heard[i] == 1 << (sensor.number % 62):
         # begun at the very edge of the coverage, where it cannot be seen again
         log_miss = math.log(1.0 - sensor.p_detection)
         weigh(tr, i, log_miss, log_miss, temper)

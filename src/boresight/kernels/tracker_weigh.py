@@ -115,11 +115,26 @@ def draw_in(
 
 @njit(**LEAF)
 def weigh(tr: Tracks, i: int, log_visible: float, log_static: float, temper: float) -> None:
-    """Multiply the weights by the likelihoods of the hypotheses (hidden and nothing: 1) and normalise."""
+    """Multiply the weights by the likelihoods of the hypotheses (hidden and nothing: 1) and normalise.
+
+    Against the best of them, in logarithms: however improbable a look, something remains.
+    """
     w = tr.weight[i]
-    w[VISIBLE] *= math.exp(temper * log_visible)
-    w[STATIC] *= math.exp(temper * log_static)
-    total = w[0] + w[1] + w[2] + w[3]
+    best = -math.inf
+    for a in range(4):
+        if w[a] > 0.0:
+            w[a] = math.log(w[a])
+            if a == VISIBLE:
+                w[a] += temper * log_visible
+            elif a == STATIC:
+                w[a] += temper * log_static
+            best = max(best, w[a])
+        else:
+            w[a] = -math.inf
+    total = 0.0
+    for a in range(4):
+        w[a] = math.exp(w[a] - best)
+        total += w[a]
     for a in range(4):
         w[a] /= total
 
@@ -137,31 +152,6 @@ def allow_stop(tr: Tracks, i: int, s: Settings) -> None:
             tr.anchor[i, a] = tr.x[i, a]
             for b in range(s.d):
                 tr.anchor_P[i, a, b] = tr.P[i, a, b]
-
-
-@njit(**LEAF)
-def allow_start(tr: Tracks, i: int, s: Settings, models: Models | None) -> None:
-    """Let an object that stood still set off from where it is now, at a speed that nobody knows yet."""
-    w = tr.weight[i]
-    target = w[VISIBLE] + w[HIDDEN]
-    if target < s.stop_floor * w[STATIC]:
-        w[VISIBLE] += s.stop_floor * w[STATIC] - target
-        w[STATIC] -= s.stop_floor * w[STATIC] - target
-        x, P, d = tr.x[i], tr.P[i], s.d
-        for a in range(2 * d):
-            for b in range(len(x)):
-                P[a, b] = P[b, a] = 0.0
-        for a in range(d):
-            x[a], x[d + a] = tr.anchor[i, a], 0.0
-            P[d + a, d + a] = s.start_speed**2
-            for b in range(d):
-                P[a, b] = tr.anchor_P[i, a, b]
-        if models is not None:
-            for j in range(2):
-                for a in range(len(x)):
-                    tr.mode_x[i, j, a] = x[a]
-                    for b in range(len(x)):
-                        tr.mode_P[i, j, a, b] = P[a, b]
 
 
 @njit(**LEAF)
@@ -271,18 +261,14 @@ def take(
         else:
             condition_models(tr, i, s, k, look, sensor, room, considered)
     weigh(tr, i, log_visible, log_static, temper)
-    note_hit(tr, i, s, sensor, look.t + look.dt[k], sensor.moves_tracks, models)
+    note_hit(tr, i, s, sensor, look.t + look.dt[k], sensor.moves_tracks)
 
 
 @njit(**LEAF)
-def note_hit(
-    tr: Tracks, i: int, s: Settings, sensor: SensorTable, t: float, moved: bool, models: Models | None
-) -> None:
+def note_hit(tr: Tracks, i: int, s: Settings, sensor: SensorTable, t: float, moved: bool) -> None:
     """Remember that track `i` was detected at time `t` (s), and whether that moved it."""
     if sensor.ranging:
         allow_stop(tr, i, s)
-        if s.start_speed > 0.0 and tr.heard[i] > 0:
-            allow_start(tr, i, s, models)
     if moved:
         tr.heard[i] |= 1 << (sensor.number % 62)
     tr.life[i, 1] = t

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from boresight.types import FloatArray, Ignore, TrackRows, Truth
 
 STEP = 0.5  # s
+SILENCE = 600.0  # s without any report: nothing in it is scored
 MAX_AGE = 2.0  # s: a row older than this says nothing about now
 
 
@@ -24,10 +25,17 @@ class Sampled:
     covariance: FloatArray | None = None
 
 
-def clock_of(first: float, last: float) -> FloatArray:
-    """Return the times (s) from the first to the last detection in steps of 0.5 s."""
-    steps = int(np.floor((last - first) / STEP + 1e-9))
-    return np.asarray(first + STEP * np.arange(steps + 1.0), dtype=np.float64)
+def clock_of(stamps: FloatArray) -> FloatArray:
+    """Return the times (s) from the first to the last of some stamps (n,) in steps of 0.5 s, long silences left out.
+
+    Where no stamp lies for more than `SILENCE` s there are no times, so that their number follows from the reports.
+    """
+    t = np.unique(stamps)
+    ends = np.flatnonzero(np.diff(t) > SILENCE)
+    first, last = t[np.r_[0, ends + 1]], t[np.r_[ends, len(t) - 1]]
+    begin = np.ceil((first - t[0]) / STEP - 1e-9)
+    end = np.floor((last - t[0]) / STEP + 1e-9)
+    return np.concatenate([t[0] + STEP * (a + np.arange(b - a + 1.0)) for a, b in zip(begin, end, strict=True)])
 
 
 def sample_truth(truth: Truth, clock: FloatArray, d: int) -> Sampled:

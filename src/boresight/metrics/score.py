@@ -69,10 +69,10 @@ def score(recording: Recording, tracks: TrackRows, decisions: DecisionRows | Non
         raise UserError(f"recording '{recording.name}' has no truth (truth.parquet): tracks cannot be scored")
     d = recording.dimensions
     used = [i for i, s in enumerate(recording.sensors) if sensors is None or s.id in sensors]
-    stamps = recording.detections.t[np.isin(recording.detections.sensor, used)]
+    stamps = recording.detections.t[np.isin(recording.detections.sensor, used) & recording.usable]
     if len(stamps) == 0:
         raise UserError(f"recording '{recording.name}' has no detections of these sensors: nothing to score")
-    clock = clock_of(float(stamps.min()), float(stamps.max()))
+    clock = clock_of(stamps)
     truth = [sample_truth(t, clock, d) for t in recording.truth]
     ours = _walk(recording, truth, sample_tracks(tracks, clock, d), clock)
     empty = _walk(recording, truth, sample_tracks(no_tracks(), clock, d), clock)

@@ -54,7 +54,9 @@ def collect(results: Results, recording: Recording | None) -> dict[str, Any]:
 
 
 def _span(results: Results, recording: Recording | None) -> tuple[float, float]:
-    t = recording.detections.t if recording is not None else results.tracks.t
+    if recording is not None:
+        return recording.span
+    t = results.tracks.t
     return (float(t.min()), float(t.max())) if len(t) else (0.0, 1.0)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from boresight.engine.track import run
 from boresight.frames.pose import pose_track
 from boresight.io.scans import iter_scans
 from boresight.metrics.score import score
@@ -16,7 +17,7 @@ from boresight.sim.scenario import Scenario, simulate
 from boresight.study.bound import bound_at
 from boresight.study.plan import Task, build
 from boresight.tracking.config import TrackerConfig
-from boresight.tracking.run import run, track_rows, tracker_for
+from boresight.tracking.run import track_rows, tracker_for
 from boresight.types import FloatArray, Recording
 
 DEFAULTS = {2: (0.1, 8.0), 3: (1.0, 150.0)}  # q (m²/s³), speed (m/s), where the tracker's configuration says nothing

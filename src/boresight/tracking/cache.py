@@ -7,7 +7,7 @@ import gc
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 
@@ -24,6 +24,26 @@ def compiled() -> bool:
     except AttributeError:
         return True
     return bool(os.path.exists(index))
+
+
+@contextlib.contextmanager
+def told_of_compiling(say: Callable[[str], None]) -> Iterator[None]:
+    """Call `say` with the name of each kernel that Numba begins to compile while the body runs, callers before callees.
+
+    What comes from the cache is not compiled, however long that takes.
+    """
+    from numba.core.event import Event, Listener, install_listener
+
+    class Told(Listener):  # type: ignore[misc]  # Numba has no types
+        def on_start(self, event: Event) -> None:
+            kernel = event.data["dispatcher"].py_func
+            say(f"{kernel.__module__.removeprefix('boresight.')}.{kernel.__name__}")
+
+        def on_end(self, event: Event) -> None:
+            pass
+
+    with install_listener("numba:compile", Told()):
+        yield
 
 
 @contextlib.contextmanager

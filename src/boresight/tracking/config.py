@@ -10,7 +10,7 @@ from boresight.errors import UserError, did_you_mean
 
 ASSOCIATIONS = ("nearest", "jpda")
 # what values may be; None is left out
-POSITIVE = ("survival_time", "hide_time", "show_time", "speed_sigma")
+POSITIVE = ("survival_time", "hide_time", "show_time", "speed_sigma", "rest_time", "hide_after")
 TIMES = ("manoeuvre_every", "manoeuvre_lasts")
 SHARES = ("static_share", "stop_floor", "doubt", "delete_below", "blob_share")
 NOT_NEGATIVE = (
@@ -72,8 +72,9 @@ class TrackerConfig:
     show_time: float = 10.0  # s, mean time for which it stays hidden
     static_share: float = 0.3  # of new objects do not move (and are not reported)
     static_q: float = 0.5  # m²/s, how an object that does not move may still wander
-    stop_floor: float = 0.02  # least weight of "it stands still" beside that of a moving target, and vice versa
-    start_speed: float = 0.0  # m/s: what stood still may set off at about this speed, per axis (0: it may not)
+    stop_floor: float = 0.02  # least weight of "it stands still" beside that of a moving target
+    rest_time: float = 600.0  # s, mean time for which what stands stays so, until it sets off (inf: for ever)
+    start_speed: float | None = None  # m/s, per axis, at about which it does (None: a quarter of speed_sigma)
     targets_at_start: float = 5.0  # expected number of targets before the first look
     apart: float = 0.0  # m: a track nearer than this to a shown one is not shown beside it
     doubt: float = 0.1  # least probability of existence with which a track competes for detections
@@ -86,6 +87,7 @@ class TrackerConfig:
     clutter_memory: float = 30.0  # looks
     extent: float = 0.0  # m, per axis: how far the point of a target that is reported lies from the one that is meant
     coast_after: float = 4.0  # s without a hit after which a shown track counts as coasting
+    hide_after: float = math.inf  # s without a hit after which it is shown no more, however probable
     smoothing_lag: float | None = None  # s: also give the tracks of so long ago, smoothed with all that came since
     window: float | None = (
         None  # s, how late a report may be (None: spread of the declared latencies + half the longest period + 1 s)

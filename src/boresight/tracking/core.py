@@ -15,8 +15,11 @@ from boresight.kernels.tracker import AZIMUTH_BINS, Extras, IntArray, Models, Se
 from boresight.kernels.tracker_copies import WHOLE, Copies, each_of, no_copies
 from boresight.kernels.tracker_looks import columns_of
 from boresight.tracking.config import SensorErrors, TrackerConfig
-from boresight.types import N_COMPONENTS, Component, FloatArray, Sensor, SensorKind
+from boresight.types import N_COMPONENTS, Component, FloatArray, Reporting, Sensor
 
+MOST_SENSORS = 62  # bits of what each track was seen by
+START_SHARE = 0.25  # of the prior speed: with that, what stood sets off where nothing is said
+WRONG_ID = 0.02  # probability that an address is not the target's own, where nothing is said
 _BIASED = {
     Component.RANGE: "bias_range",
     Component.AZIMUTH: "bias_azimuth",
@@ -45,6 +48,11 @@ def make_plan(
     """Pack a configuration for `sensors` in `dimensions` (2 or 3); biases are planned for those in `used` (all)."""
     d = dimensions
     flat = d == 2
+    taking = range(len(sensors)) if used is None else used
+    if len({i % MOST_SENSORS for i in taking}) < len(taking):
+        raise UserError(
+            f"{len(sensors)} sensors: the tracker tells at most {MOST_SENSORS} apart; use fewer (--sensors)"
+        )
     sigma: list[float] = []
     tau: list[float] = []
     tables = []
@@ -68,8 +76,10 @@ def make_plan(
     for place, (_, (index, parameter)) in enumerate(known):
         constants[index][parameter] = 2 * d + len(sigma) - len(known) + place
     witnesses = [t.number for t in tables if _bears_witness(t)]
+    spoken = [t.number for t in tables if t.single or t.wrong_id > 0.0]
     tables = [
         t._replace(
+            spoken=spoken.index(t.number) if t.number in spoken else -1,
             registers=bool((t.constant >= 0).any()),
             witness=witnesses.index(t.number) if t.number in witnesses else -1,
         )
@@ -82,7 +92,7 @@ def make_plan(
     n = 2 * d + len(sigma)
     extras = bool(known or config.blob_share > 0.0 or any(t.joint for t in tables)) or None
     models = _models(config, settings.q)
-    empty = _before_all(settings, tables, n, len(witnesses), models is not None)
+    empty = _before_all(settings, tables, n, len(witnesses), len(spoken), models is not None)
     return Plan(settings, tuple(tables), n, columns_of(tuple(tables)), empty, extras, models)
 
 
@@ -94,8 +104,9 @@ def _bears_witness(sensor: SensorTable) -> bool:
 def _table(
     number: int, sensor: Sensor, errors: SensorErrors, bias: IntArray, constant: IntArray, joint: bool, gate: float
 ) -> SensorTable:
-    """Pack one sensor; `registers` and `witness` are set once their places are known. `gate` is in σ."""
+    """Pack one sensor; `registers`, `witness` and `spoken` are set once their places are known. `gate` is in σ."""
     c = sensor.coverage
+    single = sensor.reporting is Reporting.SINGLE
     sigma = sensor.sigma[Component.AZIMUTH]
     span = c.azimuth[1] - c.azimuth[0]
     if span <= 0.0:
@@ -110,7 +121,7 @@ def _table(
         azimuth_span=min(span, 2.0 * math.pi),
         elevation_low=c.elevation[0],
         elevation_high=c.elevation[1],
-        ranging=sensor.kind not in (SensorKind.INFRARED, SensorKind.OPTICAL),
+        ranging=sensor.ranging,
         bias=bias,
         registers=False,
         constant=constant,
@@ -123,6 +134,10 @@ def _table(
         witness=-1,
         gate_width=2.0 * gate * math.hypot(sigma if math.isfinite(sigma) else 0.0, errors.bias_azimuth),
         joint=joint,
+        single=single,
+        interval=(sensor.period or 0.0) if single else 0.0,
+        spoken=-1,
+        wrong_id=sensor.p_wrong_id if sensor.p_wrong_id is not None else (WRONG_ID if single else 0.0),
     )
 
 
@@ -137,11 +152,12 @@ def _settings(
 ) -> Settings:
     """Pack the settings; `ranging` are the ranging sensors in use, `report_range` (n_sensors,) theirs, 0 of others."""
     flat = d == 2
+    speed = config.speed_sigma if config.speed_sigma is not None else (8.0 if flat else 150.0)
     return Settings(
         d=d,
         q=config.q if config.q is not None else (0.1 if flat else 1.0),
         gates=np.array([0.0, *chi2.ppf(config.gate_probability, np.arange(1, 8))]),
-        speed_sigma=config.speed_sigma if config.speed_sigma is not None else (8.0 if flat else 150.0),
+        speed_sigma=speed,
         birth_rate=config.birth_rate,
         survival_time=config.survival_time,
         hide_time=config.hide_time,
@@ -149,7 +165,8 @@ def _settings(
         static_share=config.static_share,
         static_q=config.static_q,
         stop_floor=config.stop_floor,
-        start_speed=config.start_speed,
+        rest_time=config.rest_time,
+        start_speed=config.start_speed if config.start_speed is not None else START_SHARE * speed,
         targets_at_start=config.targets_at_start,
         doubt=config.doubt,
         delete_below=config.delete_below,
@@ -165,6 +182,7 @@ def _settings(
         clutter_memory=config.clutter_memory,
         blob=max([t.resolution for t in ranging], default=0.0),
         blob_share=config.blob_share,
+        hide_after=config.hide_after,
         extent=config.extent,
     )
 
@@ -209,7 +227,9 @@ def _constants(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[i
     ]
 
 
-def _before_all(settings: Settings, sensors: Sequence[SensorTable], n: int, witnesses: int, models: bool) -> Copies:
+def _before_all(
+    settings: Settings, sensors: Sequence[SensorTable], n: int, witnesses: int, spoken: int, models: bool
+) -> Copies:
     """Return one copy of a table without tracks of `n` states, which two models have too if wanted."""
     k = settings.n_constant
     clutter = np.zeros((len(sensors), AZIMUTH_BINS + 1))
@@ -232,6 +252,8 @@ def _before_all(settings: Settings, sensors: Sequence[SensorTable], n: int, witn
         beside=np.zeros(0, np.int64),
         told=np.zeros((0, k, k + 1)),
         witness=np.zeros((0, witnesses, 2)),
+        spoken=np.zeros((0, spoken, 4)),
+        pace=np.zeros((len(sensors), 4)),
         bank=np.zeros((k, k + 1)),
         undetected=np.full(1, settings.targets_at_start),
         seen_range=np.zeros(len(sensors)),

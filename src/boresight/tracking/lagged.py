@@ -49,7 +49,9 @@ def smoothed_rows(window: Window, plan: Plan, after: float, until: float, t_know
         x, P = _back(tracks, here, plan.settings, dt, q, x[there], P[there])
         t -= dt
         if t <= until:
-            out.append(_rows(birth, x, P, t, t_known, t - hit > coast, plan.settings))
+            heard = t - hit <= plan.settings.hide_after
+            parts = birth[heard], x[heard], P[heard]
+            out.append(_rows(*parts, t, t_known, (t - hit > coast)[heard], plan.settings))
     return out[::-1]
 
 

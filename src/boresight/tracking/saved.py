@@ -21,7 +21,7 @@ from boresight.tracking.tracker import Tracker, TrackerState
 from boresight.tracking.window import Window, held
 
 Arrays = dict[str, NDArray[np.generic]]
-FORMAT = 6
+FORMAT = 7
 
 
 def snapshot(state: TrackerState) -> TrackerState:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boresight.frames.pose import PoseTrack, add_navigation_noise, sensor_poses
-from boresight.kernels.tracker_looks import Looks, moment, places_of_looks
+from boresight.kernels.tracker_looks import NO_LOOK, Looks, moment, places_of_looks
 from boresight.kernels.tracker_rows import ARRIVAL, PENDING, RowTable, row_table, rows_at_arrival, times_due
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.core import Plan, make_plan
@@ -18,7 +18,7 @@ from boresight.tracking.lagged import smoothed_rows
 from boresight.tracking.names import Names
 from boresight.tracking.output import Decisions, Rows, decisions_of, rows_of, unseen
 from boresight.tracking.window import Window, empty_window, take, what_became
-from boresight.types import NO_TRACK, Fate, FloatArray, Scan, Sensor
+from boresight.types import NO_TRACK, Fate, FloatArray, Reporting, Scan, Sensor, addresses_of
 
 REASON = {
     Fate.UNASSOCIATED: "no track took it, and it begins none",
@@ -81,18 +81,29 @@ class Tracker:
         length = self.config.window
         if length is None:
             # a look that sweeps one period arrives half of it after its middle
-            sweep = 0.5 * max((self.sensors[i].period or 0.0 for i in used), default=0.0)
+            sweep = 0.5 * max((_turn(self.sensors[i]) or 0.0 for i in used), default=0.0)
             length = max(latencies) - min(latencies) + sweep + 1.0
         object.__setattr__(self, "length", length)
         period = np.zeros(len(self.sensors))
         for i in used:
-            period[i] = np.nan if self.sensors[i].period is None else self.sensors[i].period
+            turn = _turn(self.sensors[i])
+            period[i] = np.nan if turn is None else turn
         object.__setattr__(self, "_period", period)
 
     @property
     def used(self) -> tuple[int, ...]:
         """Indices of the sensors in use."""
         return tuple(range(len(self.sensors))) if self.use is None else self.use
+
+    def cannot_begin(self) -> str:
+        """Return in words that no sensor in use can begin a track; empty if one can."""
+        if any(self.sensors[i].begins for i in self.used):
+            return ""
+        names = ", ".join(self.sensors[i].id for i in self.used) or "none"
+        return (
+            f"no sensor in use can begin a track ({names}): one of them has to measure range and azimuth "
+            "(sigma_range_m, sigma_azimuth_deg) or a position (sigma_position_m)"
+        )
 
     def init(self) -> TrackerState:
         """Return the state before the first look."""
@@ -131,11 +142,15 @@ class Tracker:
         """Give the rows due by `t_recv` (s) although no look comes in: a stage before the tracker may hold looks."""
         return self._take(state, moment(t_recv))
 
+    def due(self, state: TrackerState, t: float) -> Output:
+        """Give the rows due by time `t` (s), nothing having arrived since: what comes later is the same without."""
+        return self._take(state, moment(t, NO_LOOK))
+
     def finish(self, state: TrackerState) -> tuple[TrackerState, Output]:
         """Give the rows that the last arrival calls for, the decisions and the smoothed rows still in the window."""
         window, out = state.window, Output([], [], [])
         if window.clock.now[PENDING]:
-            times = times_due(window.clock, self._period, np.inf)
+            times = times_due(window.tracks, self.plan.settings, window.clock, self._period, np.inf)
             rows = row_table(times * int(window.tracks.live[0]), self.dimensions)
             rows_at_arrival(
                 window.tracks, self.plan.settings, window.clock, self._period, self.config.coast_after, rows,
@@ -192,6 +207,7 @@ class Tracker:
             z=np.concatenate([scan.z for scan in scans]),
             R=np.concatenate([scan.covariance for scan in scans]),
             row=np.concatenate([scan.row for scan in scans]).astype(np.int64),
+            address=np.concatenate([addresses_of(scan) for scan in scans]),
             position=np.zeros((len(t) + len(scans), 3)),
             velocity=np.zeros((len(t) + len(scans), 3)),
             axes=np.zeros((len(t) + len(scans), 3, 3)),
@@ -217,3 +233,8 @@ class Tracker:
         if track is not None:
             R, until = looks.R[detections], np.repeat(known, np.diff(first))
             looks.R[detections] = add_navigation_noise(sensor, track, t[detections], looks.z[detections], R, until)
+
+
+def _turn(sensor: Sensor) -> float | None:
+    """Return the declared time between two looks of a sensor (s), None where none is: the period of messages is not."""
+    return None if sensor.reporting is Reporting.SINGLE else sensor.period

@@ -24,6 +24,13 @@ class Axes(StrEnum):
     MOUNT = "mount"  # the body turned by the sensor's mounting angles
 
 
+class Reporting(StrEnum):
+    """What one look of a sensor tells of."""
+
+    SCAN = "scan"  # of all targets in its coverage: what is not in it was missed
+    SINGLE = "single"  # of one target, which reports by itself (transponder, AIS, MLAT, another tracker): of no other
+
+
 class TrackStatus(StrEnum):
     """Where a track stands in its life."""
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,7 @@ class Scan:
         z: (n, 7) measured components, columns by `Component`; NaN where not measured (m, rad, m/s).
         covariance: (n, 7, 7) of the measured components, NaN elsewhere.
         row: (n,) row of each detection in the file; for an empty scan the rows that said so stand in `empty_rows`.
+        address: (n,) codes of the detections' `source_id` (`address_code`), -1 where there is none; None: nowhere.
     """
 
     sensor: int
@@ -34,3 +37,17 @@ class Scan:
     covariance: FloatArray
     row: NDArray[np.int64]
     empty_rows: tuple[int, ...] = ()
+    address: NDArray[np.int64] | None = None
+
+
+def addresses_of(scan: Scan) -> NDArray[np.int64]:
+    """Return the codes (n,) of the detections' addresses, -1 where there is none."""
+    return np.full(len(scan.t), -1, np.int64) if scan.address is None else scan.address
+
+
+@lru_cache(maxsize=65536)
+def address_code(word: str | None) -> int:
+    """Return the code of a `source_id`: always the same number of 52 bits for the same word, -1 for None."""
+    if word is None:
+        return -1
+    return int.from_bytes(blake2b(word.encode(), digest_size=8).digest()) >> 12

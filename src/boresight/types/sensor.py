@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from boresight.types.enums import N_COMPONENTS, Axes, SensorKind
+from boresight.types.enums import N_COMPONENTS, Axes, Component, Reporting, SensorKind
 
 FloatArray = NDArray[np.float64]
 
@@ -56,6 +56,11 @@ class Sensor:
     `sigma` (7,) holds the standard deviation of every `Component` that the sensor may measure (m, rad, m/s), NaN
     where it never measures one. `latency` (s): validity = stamp - latency. `period` (s) is None where unknown.
     `p_detection` holds within coverage; `clutter_per_scan` is the mean number of false detections of a look.
+    Where `reporting` is SINGLE a look is a message of one target: `period` (s) is then the mean time between two
+    messages of one target, and `p_detection` the probability that a target reports at all when it is due.
+    `p_wrong_id` is the probability that a `source_id` is not the target's own (None: 0.02 where reporting is SINGLE,
+    else `source_id` is not used). `height` is the prior of the targets' height above the ellipsoid (mean and standard
+    deviation, m), for a sensor that does not measure it (None: what the elevation coverage allows).
     """
 
     id: str
@@ -69,3 +74,24 @@ class Sensor:
     p_detection: float = 0.9
     clutter_per_scan: float = 1.0
     coverage: Coverage = Coverage()
+    reporting: Reporting = Reporting.SCAN
+    p_wrong_id: float | None = None
+    height: tuple[float, float] | None = None
+
+    @property
+    def ranging(self) -> bool:
+        """Whether it measures where things are, and not only in which direction: by its sigmas, not by its kind.
+
+        A sensor that declares no sigma at all (its rows bring theirs) goes by its kind.
+        """
+        if np.isnan(self.sigma).all():
+            return self.kind not in (SensorKind.INFRARED, SensorKind.OPTICAL)
+        return bool(np.isfinite(self.sigma[[Component.RANGE, Component.EAST]]).any())
+
+    @property
+    def begins(self) -> bool:
+        """Whether one detection of it can begin a track: range and azimuth, or east and north."""
+        if np.isnan(self.sigma).all():
+            return self.ranging
+        polar = self.sigma[[Component.RANGE, Component.AZIMUTH]]
+        return bool(np.isfinite(polar).all() or np.isfinite(self.sigma[[Component.EAST, Component.NORTH]]).all())
