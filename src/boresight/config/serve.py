@@ -174,5 +174,6 @@ def _pointing(table: PointingTable, declared: Declaration, where: str) -> Tracke
         raise UserError(f'{where}: pointing.follow = "{follow}"; give "track:ID", "nearest" or "strongest"')
     if not (table.beam.rate_hz > 0 and table.beam.width_deg > 0 and table.output.command_rate_hz > 0):
         raise UserError(f"{where}: pointing: beam.rate_hz, beam.width_deg and command_rate_hz must be above zero")
-    pointer = track_pointer(declared.site, table.beam, table.face, table.stale_s)
-    return TrackerSite(pointer, mount_of(table.mount), table.beam.rate_hz, follow, table.sigma_up_m, table.output)
+    mount = mount_of(table.mount)
+    pointer = track_pointer(declared.site, table.beam, table.face, table.stale_s, mount.mask)
+    return TrackerSite(pointer, mount, table.beam.rate_hz, follow, table.sigma_up_m, table.output)

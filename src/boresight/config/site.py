@@ -10,11 +10,11 @@ from boresight.errors import UserError, did_you_mean
 from boresight.frames.array_face import Pole
 from boresight.io.files import read_text
 from boresight.io.toml import TableModel, convert, read_toml
+from boresight.pointing.elements import Satellite, label, read_elements
 from boresight.pointing.follow import TrackGuide
 from boresight.pointing.guide import GuideFilter, GuideSource
-from boresight.pointing.mount import Mount
+from boresight.pointing.mount import Mask, Mount
 from boresight.pointing.pointer import Choice, Pointer
-from boresight.pointing.satellite import Satellite, read_elements
 from boresight.types import Component, Recording, Sensor, Site
 
 DEG = math.pi / 180.0
@@ -87,6 +87,13 @@ class SourceTable(TableModel, frozen=True):
     lever_arm_frd_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tle: str | None = None
     satellite: str | None = None
+    max_age_days: float = 30.0
+    sigma_azimuth_deg: float = 0.0
+    sigma_elevation_deg: float = 0.0
+    sigma_bias_azimuth_deg: float = 0.0
+    sigma_bias_elevation_deg: float = 0.0
+    sigma_bias_range_m: float = 0.0
+    sigma_bias_time_s: float = 0.0
 
 
 class InputTable(TableModel, frozen=True):
@@ -170,9 +177,9 @@ def mount_of(m: MountTable) -> Mount:
     )  # fmt: skip
 
 
-def track_pointer(site: Site, beam: BeamTable, face: FaceTable, stale: float) -> Pointer:
+def track_pointer(site: Site, beam: BeamTable, face: FaceTable, stale: float, horizon: Mask) -> Pointer:
     """Return the pointer that follows a track of the tracker in the same process."""
-    return Pointer(TrackGuide(site), site, (False,), **_beam(beam, face), stale=stale)
+    return Pointer(TrackGuide(site), site, (False,), **_beam(beam, face), stale=stale, horizon=horizon)
 
 
 def _beam(beam: BeamTable, face: FaceTable) -> dict[str, Any]:
@@ -190,18 +197,26 @@ def _check_source(one: SourceTable, path: Path, platform: str | None) -> None:
         raise UserError(f"{path}: source '{one.id}': axes and lever_arm_frd_m go with platform = \"…\" of the file")
     if one.correlation_s is None and (one.tracks is not None or one.track_id is not None):
         raise UserError(f"{path}: source '{one.id}': tracks go with correlation_s, over which their errors resemble")
+    if not one.max_age_days > 0:
+        raise UserError(f"{path}: source '{one.id}': max_age_days must be above zero")
     if not one.sigma_up_m > 0:
         raise UserError(f"{path}: source '{one.id}': sigma_up_m must be above zero")
 
 
 def _satellite(source: SourceTable, path: Path) -> Satellite:
     where = path.parent / str(source.tle)
-    known = {one.name: one for one in read_elements(read_text(where), str(where))}
+    refused: list[str] = []
+    found = read_elements(read_text(where), str(where), refused)
     if source.satellite is None:
-        return next(iter(known.values()))
-    if source.satellite not in known:
-        raise UserError(f"{where}: no satellite '{source.satellite}'{did_you_mean(source.satellite, known)}")
-    return known[source.satellite]
+        wanted = [one for one in found if one.number == found[0].number]
+    else:
+        name = label(source.satellite)
+        wanted = [one for one in found if name in (one.name, one.number)]
+    if not wanted:
+        why = [reason for reason in refused if str(source.satellite) in reason]
+        hint = f": {why[0]}" if why else did_you_mean(str(source.satellite), [one.name for one in found])
+        raise UserError(f"{where}: no satellite '{source.satellite}'{hint}")
+    return max(wanted, key=lambda one: one.epoch)
 
 
 def pointer_for(station: Station, recording: Recording | None = None) -> Pointer:
@@ -233,13 +248,16 @@ def pointer_for(station: Station, recording: Recording | None = None) -> Pointer
         **_beam(file.beam, file.face),
         choice=Choice(file.choice),
         stale=file.stale_s,
+        horizon=station.mount.mask,
     )
 
 
 def _source(s: SourceTable) -> GuideSource:
     return GuideSource(
-        s.id, s.sigma_angle_deg * DEG, s.sigma_range_m, s.sigma_position_m, s.sigma_bias_m, s.correlation_s
-    )
+        s.id, s.sigma_angle_deg * DEG, s.sigma_range_m, s.sigma_position_m, s.sigma_bias_m, s.correlation_s,
+        s.sigma_azimuth_deg * DEG, s.sigma_elevation_deg * DEG, s.sigma_bias_azimuth_deg * DEG,
+        s.sigma_bias_elevation_deg * DEG, s.sigma_bias_range_m, s.sigma_bias_time_s,
+    )  # fmt: skip
 
 
 def _declared(s: Sensor) -> GuideSource:

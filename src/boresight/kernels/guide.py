@@ -33,8 +33,9 @@ ROW_THEN, ROW_Y, ROW_LOOK, ROW_SECOND = 0, 1, 2, 3
 ROW_AXES, ROW_MOTION, ROW_A, ROW_BIAS, ROW_F = 4, 7, 10, 13, 19
 ROW_H, ROW_G, ROW_S, ROW_R, ROW_ROOM = 28, 34, 40, 46, 52
 ROWS, LEAST_WIDTH = 70, 12
-# Columns of row LOOK: where the report was made, what it says, and its variances. Of a position or track: the value.
-LOOK_ORIGIN, LOOK_Z, LOOK_VARIANCE, LOOK_ACROSS = 0, 3, 6, 9
+# Columns of row LOOK: where the report was made, what it says, its variances, and how far the prediction is (m). Of a
+# position or track: the value.
+LOOK_ORIGIN, LOOK_Z, LOOK_VARIANCE, LOOK_ACROSS, LOOK_FAR = 0, 3, 6, 9, 10
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
@@ -278,6 +279,7 @@ def compare_direction(bias_azimuth: float, bias_elevation: float, bias_range: fl
     """
     d0, d1, d2 = w[ROW_THEN, 0] - w[ROW_LOOK, 0], w[ROW_THEN, 1] - w[ROW_LOOK, 1], w[ROW_THEN, 2] - w[ROW_LOOK, 2]
     r = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    w[ROW_LOOK, LOOK_FAR] = r
     d0, d1, d2 = d0 / r, d1 / r, d2 / r
     azimuth, elevation = w[ROW_LOOK, LOOK_Z] - bias_azimuth, w[ROW_LOOK, LOOK_Z + 1] - bias_elevation
     both = not (math.isnan(azimuth) or math.isnan(elevation))

@@ -15,10 +15,11 @@ from boresight.frames.array_face import Pole, enu_from_face
 from boresight.frames.azel import azel_from_enu
 from boresight.frames.local import ecef_from_enu, ecef_from_enu_rotation
 from boresight.frames.tangent import direction_from_tangent
-from boresight.kernels.guide import TRACK
+from boresight.kernels.guide import EQUATOR, TRACK
 from boresight.kernels.guide_run import ACCEPTED, C_BEST
 from boresight.pointing.beam import Aim, aim_at
 from boresight.pointing.guide import EYE, NONE, THINNED, GuideSource, Predicted
+from boresight.pointing.mount import Mask, horizon_at
 from boresight.types import Site
 from boresight.types.sensor import FloatArray
 
@@ -30,6 +31,7 @@ class Mode(StrEnum):
     OWN = "own"  # own tracking alone: no guide is fresh
     COAST = "coast"  # nobody is fresh: the prediction goes on, its covariance grows
     SEARCH = "search"  # the covariance has outgrown the beam: a spiral about the prediction
+    BELOW_HORIZON = "below_horizon"  # the target stands below the horizon: the beam waits where it is, nobody searches
     NO_ATTITUDE = "no_attitude"  # the platform's navigation is too old: face and mount angles are not known
 
 
@@ -92,7 +94,8 @@ class Pointer:
 
     `own` (s,) says which sources are own tracking. A source is fresh until `stale` (s) after its last report; going
     back from own tracking or coasting to the guides takes `settle` (s) of fresh reports: hysteresis. `search_below`
-    is the probability in the beam below which the beam begins to search while nobody is fresh.
+    is the probability in the beam below which the beam begins to search while nobody is fresh. `horizon`: corners
+    (azimuth, elevation) (rad) in the axes the mount stands on.
     """
 
     guide: Guide
@@ -106,6 +109,7 @@ class Pointer:
     stale: float = 3.0
     settle: float = 2.0
     search_below: float = 0.5
+    horizon: Mask = ()  # of what stands in the way; without it the Earth itself, from 0° on
 
     def __post_init__(self) -> None:
         if len(self.own) != len(self.guide.sources):
@@ -172,7 +176,7 @@ class Pointer:
         except UserError:
             self.guide.restart_now(state.guide)
             return state, None
-        mode = self._mode(state, t, aim)
+        mode = Mode.BELOW_HORIZON if self._below(state, t, aim, place) else self._mode(state, t, aim)
         if mode == Mode.SEARCH:
             begun = state.search_begun if state.mode == Mode.SEARCH else t
             n = state.searched + 1 if state.mode == Mode.SEARCH else 0
@@ -226,6 +230,18 @@ class Pointer:
         says = fresh & ~biased & (sigma > 0.0)  # a range alone says nothing across the line of sight
         share = np.where(says, 1.0 / (state.guide.scale * np.where(says, sigma, 1.0) ** 2), 0.0)
         return share / max(float(share.sum()), 1e-300)
+
+    def _below(self, state: PointerState, t: float, aim: Aim, place: Place | None) -> bool:
+        """Return whether the target stands below the horizon; what own tracking sees does not."""
+        if any(own and t - last <= self.stale for own, last in zip(self.own, state.last.tolist(), strict=True)):
+            return False
+        azimuth, elevation = aim.azimuth, aim.elevation
+        if not self.horizon:  # what is nearer than the point where the line of sight meets the level stands before it
+            return elevation < 0.0 and aim.distance > (EQUATOR + self.site.height) * math.sin(-elevation)
+        if place is not None and not math.isnan(place.enu_from_mount[0, 0]):
+            on_board = (float(v) for v in unit_of(azimuth, elevation) @ place.enu_from_mount)
+            azimuth, elevation, _ = azel_from_enu(*on_board)
+        return elevation < float(horizon_at(self.horizon, azimuth))
 
     def _mode(self, state: PointerState, t: float, aim: Aim) -> Mode:
         fresh = [t - last <= self.stale for last in state.last.tolist()]
