@@ -182,7 +182,7 @@ class Stats:
             sensor = self.parts.decoder.sensor_of[some.row % KEPT_ROWS]
             known = sensor >= 0
             np.add.at(self.fates, (sensor[known], some.fate[known]), 1)
-            judged = known & np.isfinite(some.nis)
+            judged = known & np.isfinite(some.nis) & np.isin(some.fate, USED)
             np.add.at(self.nis, sensor[judged], np.stack([some.nis[judged], np.ones(judged.sum())], axis=1))
 
     def latency(self, took: float) -> None:

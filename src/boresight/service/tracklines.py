@@ -8,12 +8,13 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from boresight.engine.track import TrackOutput
 from boresight.frames.local import geodetic_from_enu
 from boresight.service.commands import LineOut
 from boresight.tracking.output import Rows
-from boresight.types import FATES, Fate, Site, TrackStatus
+from boresight.types import FATES, Fate, FloatArray, Site, TrackStatus
 
 DEG = math.pi / 180.0
 HIT = 1  # column of `Tracks.life`: when it was last reported (s)
@@ -49,7 +50,7 @@ class TrackLines:
     ) -> None:
         self.outs, self.site, self.every, self.clock, self.ids = outs, site, every, clock, ids
         self.ahead: list[Rows] = []
-        self.sent: dict[int, tuple[float, float]] = {}  # by number: last hit told of, time of the last line (s)
+        self.sent = Sent()
         self.known: dict[int, dict[str, None]] = {}  # identities by the row that began the track
         self.lines = 0
 
@@ -90,39 +91,69 @@ class TrackLines:
                         del found[next(iter(found))]
 
     def _lines(self, rows: Rows, output: TrackOutput, now: float) -> list[bytes]:
+        """Return the lines of rows of one time, each of another track."""
         tr = output.state.window.tracks
         n = int(tr.live[0])
-        order = np.argsort(tr.birth[:n])
         if not n:
             return []
+        order = np.argsort(tr.birth[:n])
         at = np.minimum(np.searchsorted(tr.birth[:n], rows.birth, sorter=order), n - 1)
-        hit = np.where(tr.birth[order[at]] == rows.birth, tr.life[order[at], HIT], -np.inf).tolist()
+        hit = np.where(tr.birth[order[at]] == rows.birth, tr.life[order[at], HIT], -np.inf)
+        told, when = self.sent.of(rows.track_id)
+        rows = _part(rows, which := (told != hit) | (now - when >= self.every))
+        if not len(rows.t):
+            return []
+        self.sent.put(rows.track_id, hit[which], now)
+        if len(self.known) > 2 * n + 1000:
+            alive = set(tr.birth[:n].tolist())
+            self.known = {k: v for k, v in self.known.items() if k in alive}
         d = rows.position.shape[1]
         up = rows.position[:, 2] if d == 3 else np.zeros(len(rows.t))
         latitude, longitude, height = geodetic_from_enu(rows.position[:, 0], rows.position[:, 1], up, self.site)
         upper = np.triu_indices(d)
         covariance = rows.covariance[:, upper[0], upper[1]].tolist()
-        where, speed = rows.position.tolist(), rows.velocity.tolist()
-        lat, lon, high = (np.asarray(latitude) / DEG).tolist(), (np.asarray(longitude) / DEG).tolist(), height.tolist()
+        nothing = [None] * len(rows.t)
+        places = [*rows.position.T.tolist(), nothing][:3]
+        speeds = [*rows.velocity.T.tolist(), nothing][:3]
+        columns = zip(
+            rows.track_id.tolist(), rows.t.tolist(), rows.t_known.tolist(), rows.coasting.tolist(),
+            (np.asarray(latitude) / DEG).tolist(), (np.asarray(longitude) / DEG).tolist(),
+            np.asarray(height).tolist() if d == 3 else nothing, *places, *speeds, covariance, rows.birth.tolist(),
+            strict=True,
+        )  # fmt: skip
+        encode, words = msgspec.json.Encoder().encode, (str(TrackStatus.CONFIRMED), str(TrackStatus.COASTING))
+        line: Any = TrackLine
         out = []
-        for i, number in enumerate(rows.track_id.tolist()):
-            last = self.sent.get(number)
-            if last is not None and last[0] == hit[i] and now - last[1] < self.every:
-                continue
-            self.sent[number] = hit[i], now
-            names = list(reversed(self.known.get(int(rows.birth[i]), {})))
-            line = TrackLine(
-                number, float(rows.t[i]), float(rows.t_known[i]),
-                str(TrackStatus.COASTING if rows.coasting[i] else TrackStatus.CONFIRMED),
-                lat[i], lon[i], high[i] if d == 3 else None, where[i][0], where[i][1], where[i][2] if d == 3 else None,
-                speed[i][0], speed[i][1], speed[i][2] if d == 3 else None, covariance[i], names,
-            )  # fmt: skip
-            out.append(msgspec.json.encode(line) + b"\n")
-        if len(self.sent) > 2 * len(rows.t) + 1000:
-            self.sent = {k: v for k, v in self.sent.items() if now - v[1] < 60.0}
-            alive = set(tr.birth[:n].tolist())
-            self.known = {k: v for k, v in self.known.items() if k in alive}
+        for number, t, t_known, coasts, *numbers, birth in columns:
+            names = list(reversed(self.known[birth])) if birth in self.known else []
+            out.append(encode(line(number, t, t_known, words[coasts], *numbers, names)) + b"\n")
         return out
+
+
+class Sent:
+    """What was told last of each track, by its number: its last report (s), and when (s)."""
+
+    def __init__(self) -> None:
+        self.number = np.zeros(0, np.int64)  # ascending
+        self.hit = np.zeros(0)
+        self.time = np.zeros(0)
+
+    def of(self, number: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+        """Return both for tracks (n,), NaN and -inf where nothing was told."""
+        if not len(self.number):
+            return np.full(len(number), np.nan), np.full(len(number), -np.inf)
+        at = np.minimum(np.searchsorted(self.number, number), len(self.number) - 1)
+        known = self.number[at] == number
+        return np.where(known, self.hit[at], np.nan), np.where(known, self.time[at], -np.inf)
+
+    def put(self, number: NDArray[np.int64], hit: FloatArray, now: float) -> None:
+        """Note what is told of tracks (n,) at `now` (s); what is a minute old goes."""
+        kept = ~np.isin(self.number, number) & (self.time > now - 60.0)
+        everything = np.concatenate([self.number[kept], number])
+        order = np.argsort(everything, kind="stable")
+        self.number = everything[order]
+        self.hit = np.concatenate([self.hit[kept], hit])[order]
+        self.time = np.concatenate([self.time[kept], np.full(len(number), now)])[order]
 
 
 def _part(rows: Rows, which: Any) -> Rows:
