@@ -60,7 +60,8 @@ def send(
     sent = size = 0
     try:
         with socket.socket(socket.AF_INET, kind) as out:
-            out.connect(where)
+            if scheme == "tcp":
+                out.connect(where)
             begun, first = time.monotonic(), math.nan
             shift = 0.0
             for t_recv, row in lines_of(recording):
@@ -73,7 +74,10 @@ def send(
                 line = msgspec.json.encode(moved(row, shift) if now else row) + b"\n"
                 if len(line) > DATAGRAM and scheme == "udp":
                     raise UserError(f"a look of {len(line)} bytes does not fit into a datagram; send it over tcp")
-                out.sendall(line)
+                if scheme == "tcp":
+                    out.sendall(line)
+                else:
+                    out.sendto(line, where)  # a receiver that is not there is its own affair
                 sent, size = sent + 1, size + len(line)
     except OSError as error:
         raise UserError(f"{to}: {error.strerror or error} (after {sent} lines)") from None

@@ -265,7 +265,7 @@ class LookDecoder:
             nothing = np.full((1, 2 * N_COMPONENTS), NAN)
             if self._repeated(sensor, np.array([t_look]), nothing, [None], [None], row)[0]:
                 return None
-            return Scan(sensor, t_look, arrival, *_NOTHING, (row,))
+            return Scan(sensor, t_look, arrival, *NOTHING, (row,))
         z = self._values(found, one)
         t = np.array([t_look if d.t_s is None else d.t_s + shift for d in found])
         if not (np.abs(t - t_look) <= self.oldest).all():
@@ -392,7 +392,8 @@ class LookDecoder:
         return out
 
 
-_NOTHING = (
+NOTHING = (  # t, z, covariance and row of a look that saw nothing
+
     np.zeros(0), np.zeros((0, N_COMPONENTS)), np.zeros((0, N_COMPONENTS, N_COMPONENTS)), np.zeros(0, np.int64),
 )  # fmt: skip
 

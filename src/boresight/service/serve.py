@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
 
+import msgspec
 import numpy as np
 
 from boresight.config.serve import InputTable, Service
@@ -21,7 +22,8 @@ from boresight.engine.guide import Guiding
 from boresight.engine.loop import run
 from boresight.engine.track import Tracking, TrackOutput, TrackState
 from boresight.errors import UserError
-from boresight.io.jsonlines import KEPT_ROWS, UNKNOWN, LookDecoder
+from boresight.frames.local import enu_from_geodetic, geodetic_from_enu
+from boresight.io.jsonlines import KEPT_ROWS, NOTHING, UNKNOWN, Fix, LookDecoder, line_of, navigation
 from boresight.io.livelog import Kind, LogReader, LogWriter
 from boresight.io.logged import decoder_of, sigmas_of
 from boresight.service.clock import Clock
@@ -34,7 +36,7 @@ from boresight.service.source import LiveSource, LogSource, Waiting
 from boresight.service.tracklines import TrackLines
 from boresight.tracking.tracker import Tracker, TrackerState
 from boresight.tracking.warm import warm_tracker
-from boresight.types import FATES, Detections, Fate, Recording
+from boresight.types import FATES, Detections, Fate, Recording, Scan
 
 TELL = 1.0  # s between status lines on a terminal
 TELL_QUIETLY = 10.0  # s between them elsewhere
@@ -308,7 +310,7 @@ def serve(
     """
     clock = clock if clock is not None else Clock()
     parts = parts_of(service)
-    warm_tracker(parts.tracker)
+    warm(parts)
     restored = _restored(parts, log, status) if resume and log is not None else None
     inputs = inputs_of(service)
     outs = outs_of(service)
@@ -428,6 +430,29 @@ def _restored(parts: Parts, log: LogWriter, status: TextIO | None) -> TrackState
         + (f", after {gap:.1f} s without data" if math.isfinite(gap) else ""),
     )
     return state
+
+
+def warm(parts: Parts) -> None:
+    """Load (or compile) all that the first reports would call, with a decoder and poses that are thrown away."""
+    d, about = parts.service.declaration, parts.service.logged
+    tracker = parts.tracker
+    warm_tracker(tracker)
+    poses = LivePoses(d.site, 60.0, sigmas_of(about))
+    for name in {s.platform for s in d.sensors if s.platform is not None}:
+        for t in (0.0, 0.1, 0.2):
+            line = {"platform": name, "t_s": t, "east_m": t, "north_m": 0.0, "up_m": 0.0, "yaw_deg": 1.0}
+            m = line_of(msgspec.json.encode(line))
+            poses.take(Fix(name, t, t, navigation(m, d.site, d.dimensions == 2)))
+    scratch = Tracker(tracker.config, tracker.sensors, tracker.dimensions, poses)
+    scratch.looks([Scan(i, 0.1, 0.2, *NOTHING) for i in range(len(d.sensors))])
+    one = np.zeros(1)
+    geodetic_from_enu(*enu_from_geodetic(one + d.site.latitude, one + d.site.longitude, one, d.site), d.site)
+    if parts.chain is not None:
+        pointer = parts.chain.guiding.pointer
+        state = pointer.init()
+        state.guide.track, state.guide.t, state.guide.x = 0, 0.0, np.array([1e3, 1e3, 1e2, 1.0, 1.0, 0.0])
+        state.guide.P = np.eye(6)
+        pointer.tick(state, 0.0)
 
 
 def _tell(status: TextIO | None, text: str) -> None:

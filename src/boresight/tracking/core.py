@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from boresight.errors import UserError
 from boresight.kernels.registration import AZIMUTH, ELEVATION, N_PARAMETERS, RANGE, SCALE, TIME
@@ -65,7 +65,7 @@ def make_plan(
     sigma: list[float] = []
     tau: list[float] = []
     tables = []
-    gate = math.sqrt(chi2.ppf(config.gate_probability, 1))
+    gate = math.sqrt(2.0 * gammaincinv(0.5, config.gate_probability))
     constants = [np.full(N_PARAMETERS, -1, np.int64) for _ in sensors]  # filled when the number of biases is known
     report_range = np.zeros(len(sensors))
     known: list[tuple[float, tuple[int, int]]] = []  # sigma, (sensor, parameter) of the constant errors
@@ -171,7 +171,7 @@ def _settings(
     return Settings(
         d=d,
         q=config.q if config.q is not None else (0.1 if flat else 1.0),
-        gates=np.array([0.0, *chi2.ppf(config.gate_probability, np.arange(1, 8))]),
+        gates=np.array([0.0, *(2.0 * gammaincinv(0.5 * np.arange(1, 8), config.gate_probability))]),
         speed_sigma=speed,
         birth_rate=config.birth_rate,
         survival_time=config.survival_time,
