@@ -23,7 +23,6 @@ from boresight.pointing.mount import Mask, horizon_at
 from boresight.types import Site
 from boresight.types.sensor import FloatArray
 
-
 NEAR = 20e3  # m: what is nearer is in sight, unless the mount's own horizon says otherwise
 
 
