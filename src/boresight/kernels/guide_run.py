@@ -33,6 +33,8 @@ RESTING = -1e9
 ASLEEP = -8.0  # one that is further back rests, once the filter has settled …
 SETTLED = 60.0  # … after so many reports
 DOUBT = 5.0  # log-likelihood by which "all are a little off" begins behind
+LONGEST_GAP = 86400.0  # s from one report to the next, and of a prediction; beyond it nothing is known any more
+TOO_LATE = 60.0  # s behind the newest: more than any latency
 WAKE = 4.0  # rejections of one source in a row that wake the hypothesis that it is biased
 ACCEPTED, REJECTED, WAITING, STALE = 0, 1, 2, 3
 EMPTY = 5  # nothing in it that its source has a sigma for (4 is `pointing.guide.THINNED`)
@@ -59,8 +61,13 @@ def step(
         clock, X, P, L, settings, columns, priors, sigma_bias, spread, seen, source, kind, t, z, origin, axes
     ):  # fmt: skip
         return WAITING
+    if not t - clock[C_TIME] <= LONGEST_GAP:  # a wrong stamp, or so long after that nothing is known
+        _refused(clock, settings)
+        return REJECTED
     _bring_all(clock, X, P, L, settings, len(sigma_bias), t, w)
     if t < clock[C_TIME] - settings[S_MAX_AGE]:
+        if t < clock[C_TIME] - TOO_LATE:  # no latency: this stamp is wrong, or the one that the time is from
+            _refused(clock, settings)
         return STALE
     k = look_at(kind, t, z, origin, axes, sigma, scale[source], w)
     if k == 0:
@@ -86,15 +93,21 @@ def step(
         clock[C_REJECTED] = max(clock[C_REJECTED] - 1.0, 0.0)
         run_of[source] = 0.0
     else:
-        clock[C_REJECTED] += 1.0
         run_of[source] += 1.0
         if run_of[source] >= WAKE and sigma_bias[source] > 0.0 and L[source + 1] <= RESTING:
             _wake(X, P, L, int(settings[S_HELD]), best, source, sigma_bias[source])
             run_of[source] = 0.0
-        if clock[C_REJECTED] >= settings[S_RESTART]:
-            clock[C_STARTED] = 0.0
-            clock[C_RESTARTS] += 1.0
+        _refused(clock, settings)
     return fate
+
+
+@njit(**PART)
+def _refused(clock: FloatArray, settings: FloatArray) -> None:
+    """Count a report that does not fit; when such outnumber those that do, the target is forgotten."""
+    clock[C_REJECTED] += 1.0
+    if clock[C_REJECTED] >= settings[S_RESTART]:
+        clock[C_STARTED] = 0.0
+        clock[C_RESTARTS] += 1.0
 
 
 @njit(cache=True)
@@ -107,7 +120,7 @@ def surprise(
 
     The state is left alone.
     """
-    if clock[C_STARTED] == 0.0:
+    if clock[C_STARTED] == 0.0 or not t - clock[C_TIME] <= LONGEST_GAP:
         return math.nan
     k = look_at(kind, t, z, origin, axes, sigma, scale[source], w)
     if k == 0:
@@ -213,9 +226,9 @@ def predict_to(
 ) -> bool:  # fmt: skip
     """Fill ECEF position, velocity (3,) (against the turning Earth) and covariance (3, 3) at `t`; false before start.
 
-    The state itself is left alone.
+    And further than LONGEST_GAP from the newest report. The state itself is left alone.
     """
-    if clock[C_STARTED] == 0.0:
+    if clock[C_STARTED] == 0.0 or not abs(t - clock[C_TIME]) <= LONGEST_GAP:
         return False
     best = int(clock[C_BEST])
     dynamics, q = int(settings[S_DYNAMICS]), settings[S_Q]

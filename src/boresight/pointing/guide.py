@@ -215,10 +215,13 @@ class GuideFilter:
     ) -> int:
         """Take in one report, in the state's own arrays; returns its fate (`kernels.guide_run`, or THINNED).
 
+        Raises UserError for a source that is not there and arrays of other shapes, before anything is changed.
+
         `z`: azimuth, elevation (rad), range (m) from `origin` in `axes` (ECEF m; rotation), any of them NaN where it
         was not measured; or ECEF position (m) with a covariance of sigma² axes axes'; or a track: position, or position
         and velocity (6,), with a covariance of axes axes' (`GuideSource.axes_of`).
         """
+        z, origin, axes = self._checked(state, source, t, z, origin, axes)
         s, tables = self.sources[source], _tables(self)
         begun = state.clock[kernel.C_STARTED] != 0.0
         if begun and s.correlation is not None and abs(t - state.looked[source]) < s.correlation:
@@ -233,6 +236,24 @@ class GuideFilter:
             state.looked[source] = t
         return fate
 
+    def _checked(
+        self, state: GuideState, source: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return a report's arrays as the kernels take them; raises UserError for what they would read beyond."""
+        if not 0 <= source < len(self.sources):
+            raise UserError(f"source {source}: there are {len(self.sources)}, from 0 on")
+        name = self.sources[source].id
+        if not math.isfinite(t):
+            raise UserError(f"source '{name}': the report's time is {t}")
+        if state.X.shape[0] <= len(self.sources) or len(state.scale) != len(self.sources):
+            raise UserError("the state is of another guide filter: begin with init()")
+        z, origin, axes = _array(z, "z", name), _array(origin, "origin", name), _array(axes, "axes", name)
+        k = len(z) if self.sources[source].kind == TRACK and z.shape == (6,) else 3
+        for one, what, shape in ((z, "z", (k,)), (origin, "origin", (3,)), (axes, "axes", (k, k))):
+            if one.shape != shape:
+                raise UserError(f"source '{name}': {what} has shape {one.shape}, {shape} is needed")
+        return z, origin, axes
+
     def surprise(
         self, state: GuideState, source: int, t: float, z: FloatArray, origin: FloatArray = NONE, axes: FloatArray = EYE
     ) -> float:
@@ -240,6 +261,7 @@ class GuideFilter:
 
         Of several detections of a look the least is the likeliest to be the target.
         """
+        z, origin, axes = self._checked(state, source, t, z, origin, axes)
         s, tables = self.sources[source], _tables(self)
         return float(
             kernel.surprise(
@@ -264,7 +286,7 @@ class GuideFilter:
         return mean, sigma
 
     def predict(self, state: GuideState, t: float) -> Predicted | None:
-        """Return the target at time `t` (s), or None before the start; the state is left alone."""
+        """Return the target at time `t` (s), None before the start and a day after; the state is left alone."""
         out = Predicted(np.empty(3), np.empty(3), np.empty((3, 3)))
         ok = kernel.predict_to(state.clock, state.X, state.P, _tables(self).settings, t, *out, state.work)
         return out if ok else None
@@ -283,6 +305,12 @@ class GuideFilter:
             raise UserError("tracks of another tracker are thinned as they come: use step")
         node, aim = np.asarray(node, dtype=np.float64), np.asarray(aim, dtype=np.float64)
         state, k, n = self.init(), len(node), len(reports.t)
+        rows = len(reports.t)
+        shapes = ((rows,), (rows,), (rows,), (rows, 3), (rows, 3), (rows, 3, 3))
+        if any(np.shape(a) != shape for a, shape in zip(reports, shapes, strict=True)) or aim.shape != node.shape:
+            raise UserError("reports: columns of one length, z, origin (n, 3), axes (n, 3, 3); as many aims as nodes")
+        if rows and not 0 <= np.min(reports.source) <= np.max(reports.source) < len(self.sources):
+            raise UserError(f"reports: a source is not one of the {len(self.sources)}")
         tables = _tables(self)
         sigma = tables.sigma[reports.source]
         kind = np.array([s.kind for s in self.sources], dtype=np.int64)[reports.source]
@@ -293,6 +321,16 @@ class GuideFilter:
         )  # fmt: skip
         out.biased[:] -= 1
         return out
+
+
+def _array(a: ArrayLike, what: str, name: str) -> FloatArray:
+    """Return contiguous float64; the array itself if it is that."""
+    if type(a) is np.ndarray and a.dtype == np.float64 and a.flags.c_contiguous:
+        return a
+    try:
+        return np.ascontiguousarray(a, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise UserError(f"source '{name}': {what} is no array of numbers") from None
 
 
 class _Tables(NamedTuple):
