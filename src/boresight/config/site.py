@@ -154,10 +154,13 @@ def read_site(path: Path) -> Station:
         raise UserError(f"{path}: attitude_coast_s = {file.attitude_coast_s:g} must not be negative")
     for one in file.source:
         _check_source(one, path, file.platform)
-    mount = Mount(
-        (m.azimuth_deg[0] * DEG, m.azimuth_deg[1] * DEG), (m.elevation_deg[0] * DEG, m.elevation_deg[1] * DEG),
-        m.azimuth_rate_deg_s * DEG, m.elevation_rate_deg_s * DEG, tuple((a * DEG, e * DEG) for a, e in m.horizon_deg),
-    )  # fmt: skip
+    low, high = ((m.azimuth_deg[k] * DEG, m.elevation_deg[k] * DEG) for k in (0, 1))
+    horizon = tuple((a * DEG, e * DEG) for a, e in m.horizon_deg)
+    rates = (m.azimuth_rate_deg_s * DEG, m.elevation_rate_deg_s * DEG)
+    try:
+        mount = Mount((low[0], high[0]), (low[1], high[1]), *rates, horizon)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
     elements = {one.id: _satellite(one, path) for one in file.source if one.tle is not None}
     return Station(file, Site(s.latitude_deg * DEG, s.longitude_deg * DEG, s.height_m), mount, elements)
 
