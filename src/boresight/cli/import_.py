@@ -57,6 +57,8 @@ def csv(
     time_unit: str | None = None,
     time_offset: Annotated[list[str] | None, Parameter(name="--time-offset")] = None,
     ignore_columns: str | None = None,
+    geoid_height_m: float | None = None,
+    far: bool = False,
     force: bool = False,
 ) -> None:
     """Import your own CSV files, their columns named like those of detections.parquet; an empty cell is "not measured".
@@ -90,6 +92,10 @@ def csv(
         SENSOR=SECONDS to add to the stamps of a sensor or platform; may be given several times.
     ignore_columns
         Columns to leave out, separated by commas.
+    geoid_height_m
+        Height of the geoid (mean sea level) above the WGS84 ellipsoid, for columns like alt_msl.
+    far
+        Take platforms and sensors more than 1000 km from the site, which are else refused as a mistake.
     force
         Replace the output folder.
     """
@@ -98,7 +104,7 @@ def csv(
     from boresight.io.user_csv import Options, file_maps, import_csv, with_offsets
 
     ignored = [c.strip() for c in ignore_columns.split(",") if c.strip()] if ignore_columns else []
-    options = Options(guess, mapping, time_unit, _offsets(time_offset or []), ignored)
+    options = Options(guess, mapping, time_unit, _offsets(time_offset or []), ignored, geoid_height_m, far)
     if output is None:
         if not guess:
             raise UserError("import csv: give -o REC, the folder of the recording (or --guess alone to see a mapping)")

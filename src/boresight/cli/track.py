@@ -86,10 +86,10 @@ def track(
     results.summary["config_file"] = None if source is None else str(source)
     with output_folder(output, force) as folder:
         write_results(results, recording, folder)
-        if report:
-            from boresight.report.html import write_report
+    if report:  # once the results are safe
+        from boresight.report.html import write_report
 
-            write_report(folder / "report.html", results, recording)
+        write_report(output / "report.html", results, recording)
     print_notes(loss_lines(recording, results.decisions))
     counts = results.summary["counts"]
     row = {"output": str(output), **counts, "seconds": results.summary["seconds"]}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from boresight.errors import UserError, did_you_mean
 from boresight.frames.array_face import Pole
@@ -13,8 +13,9 @@ from boresight.io.files import read_text
 from boresight.io.toml import TableModel, convert, read_toml
 from boresight.kernels.guide import DIRECTION
 from boresight.pointing.elements import Satellite, label, read_elements
+from boresight.pointing.follow import TrackGuide
 from boresight.pointing.guide import GuideFilter, GuideSource
-from boresight.pointing.mount import Mount
+from boresight.pointing.mount import Mask, Mount
 from boresight.pointing.pointer import Choice, Pointer
 from boresight.types import Component, Recording, Sensor, Site
 
@@ -133,6 +134,17 @@ class SiteFile(TableModel, frozen=True):
     output: OutputTable = OutputTable()
 
 
+class TrackerSite(NamedTuple):
+    """What follows a track of a tracker: pointer, mount, rate of commands (Hz), which track, outputs."""
+
+    pointer: Pointer
+    mount: Mount
+    rate: float
+    follow: str
+    sigma_up: float
+    output: OutputTable
+
+
 class Station(NamedTuple):
     """A site file, built."""
 
@@ -154,15 +166,35 @@ def read_site(path: Path) -> Station:
         raise UserError(f"{path}: attitude_coast_s = {file.attitude_coast_s:g} must not be negative")
     for one in file.source:
         _check_source(one, path, file.platform)
-    low, high = ((m.azimuth_deg[k] * DEG, m.elevation_deg[k] * DEG) for k in (0, 1))
-    horizon = tuple((a * DEG, e * DEG) for a, e in m.horizon_deg)
-    rates = (m.azimuth_rate_deg_s * DEG, m.elevation_rate_deg_s * DEG)
     try:
-        mount = Mount((low[0], high[0]), (low[1], high[1]), *rates, horizon)
+        mount = mount_of(m)
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
     elements = {one.id: _satellite(one, path) for one in file.source if one.tle is not None}
     return Station(file, Site(s.latitude_deg * DEG, s.longitude_deg * DEG, s.height_m), mount, elements)
+
+
+def mount_of(m: MountTable) -> Mount:
+    """Return the mount of a `[mount]` table; raises UserError."""
+    return Mount(
+        (m.azimuth_deg[0] * DEG, m.azimuth_deg[1] * DEG), (m.elevation_deg[0] * DEG, m.elevation_deg[1] * DEG),
+        m.azimuth_rate_deg_s * DEG, m.elevation_rate_deg_s * DEG, tuple((a * DEG, e * DEG) for a, e in m.horizon_deg),
+    )  # fmt: skip
+
+
+def track_pointer(site: Site, beam: BeamTable, face: FaceTable, stale: float, horizon: Mask) -> Pointer:
+    """Return the pointer that follows a track of the tracker in the same process."""
+    return Pointer(TrackGuide(site), site, (False,), **_beam(beam, face), stale=stale, horizon=horizon)
+
+
+def _beam(beam: BeamTable, face: FaceTable) -> dict[str, Any]:
+    """Return the beam and the face as `Pointer` takes them."""
+    return {
+        "face": (face.azimuth_deg * DEG, face.elevation_deg * DEG, face.skew_deg * DEG),
+        "pole": Pole(face.pole),
+        "beam_width": beam.width_deg * DEG,
+        "lead": beam.computation_s + beam.link_s + beam.mechanics_s,
+    }
 
 
 def _check_source(one: SourceTable, path: Path, platform: str | None) -> None:
@@ -217,17 +249,13 @@ def pointer_for(station: Station, recording: Recording | None = None) -> Pointer
     orbit = file.dynamics.kind == "orbit"
     q = file.dynamics.q if file.dynamics.q is not None else (1e-3 if orbit else 1.0)
     spread = (1e5, 8e3, 50.0) if orbit else (1e3, 300.0, 20.0)
-    beam, face = file.beam, file.face
     return Pointer(
         GuideFilter(tuple(sources), orbit, q, file.dynamics.gate, spread=spread),
         station.site,
         tuple(named[s.id].own if s.id in named else False for s in sources),
-        (face.azimuth_deg * DEG, face.elevation_deg * DEG, face.skew_deg * DEG),
-        Pole(face.pole),
-        beam.width_deg * DEG,
-        beam.computation_s + beam.link_s + beam.mechanics_s,
-        Choice(file.choice),
-        file.stale_s,
+        **_beam(file.beam, file.face),
+        choice=Choice(file.choice),
+        stale=file.stale_s,
         horizon=station.mount.mask,
     )
 

@@ -104,7 +104,8 @@ SPELLINGS = {
 UNITS = {"length": LENGTH, "angle": ANGLE, "speed": SPEED, "time": TIME}
 SUFFIX = {"length": "_m", "angle": "_deg", "speed": "_m_s", "time": "_s"}
 # Columns that become others: speed and course velocities, latitude and longitude of detections east and north.
-EXTRA = ("speed_m_s", "course_deg", "vd_m_s", "down_m", *("latitude_deg", "longitude_deg", "height_m"))
+MSL = "height_msl_m"  # above mean sea level
+EXTRA = (MSL, "speed_m_s", "course_deg", "vd_m_s", "down_m", *("latitude_deg", "longitude_deg", "height_m"))
 # What is written for each of our columns, without its unit.
 SYNONYMS: dict[str, tuple[str, ...]] = {
     "t_s": (
@@ -159,6 +160,19 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
         "geo_altitude",
         "gps_alt",
         "alt_wgs84",
+    ),
+    MSL: (
+        "height_msl",
+        "alt_msl",
+        "altitude_msl",
+        "msl",
+        "amsl",
+        "alt_amsl",
+        "height_amsl",
+        "orthometric_height",
+        "elevation_msl",
+        "msl_altitude",
+        "gps_alt_msl",
     ),
     "yaw_deg": ("yaw", "heading", "hdg", "true_heading", "hdt", "psi"),
     "pitch_deg": ("pitch",),

@@ -62,7 +62,7 @@ def detections_of(
     t = table.numbers("t_s", required=True)
     sensor = _sensors(table, sensors)
     filed, emptied = _measured(table)
-    z = _turned(filed, sensors, sensor)
+    z = turned(filed, sensors, sensor)
     sigma = _sigmas(table, sensors, sensor, z)
     covariance = _covariances(table, sensors, sensor, z, sigma)
     _check_noise(table, sensors, sensor, z, sigma)
@@ -123,7 +123,7 @@ def _sigmas(table: Table, sensors: tuple[Sensor, ...], sensor: NDArray[np.int64]
     return sigma
 
 
-def _turned(z: FloatArray, sensors: tuple[Sensor, ...], sensor: NDArray[np.int64]) -> FloatArray:
+def turned(z: FloatArray, sensors: tuple[Sensor, ...], sensor: NDArray[np.int64]) -> FloatArray:
     """Forward/right/down to the east/north/up-like columns, and back: the turn is its own inverse."""
     frd = np.array([is_frd(s) for s in sensors])[sensor]
     z[frd, 4:] = z[frd][:, [5, 4, 6]] * [1.0, 1.0, -1.0]
@@ -220,7 +220,7 @@ def columns_of(detections: Detections, sensors: tuple[Sensor, ...]) -> dict[str,
         "sensor": pa.array(ids[sensor], pa.string()),
         "scan": detections.scan,
     }
-    z = in_unit(_turned(detections.z.copy(), sensors, sensor), UNITS)
+    z = in_unit(turned(detections.z.copy(), sensors, sensor), UNITS)
     for i, name in enumerate(MEASURED):
         if not np.isnan(z[:, i]).all() or name == "range_m":
             out[name] = nullable(z[:, i])

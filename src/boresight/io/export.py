@@ -109,5 +109,11 @@ def _kml(rows: TrackRows, places: FloatArray, name: str) -> str:
 
 
 def _when(t: float) -> str:
-    """KML's time of Unix seconds (times from another epoch count from 1970)."""
-    return datetime.fromtimestamp(round(t, 3), UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ")
+    """KML's time of Unix seconds (times from another epoch count from 1970); raises UserError for what is no date."""
+    try:
+        return datetime.fromtimestamp(round(t, 3), UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ")
+    except (ValueError, OverflowError, OSError):
+        raise UserError(
+            f"--to kml: t_s = {t:.10g} is no date in seconds since 1970 (milliseconds?); import the recording with "
+            "--time-unit, or export csv or geojson"
+        ) from None

@@ -21,6 +21,7 @@ from boresight.io.columns import (
     DAY_SECONDS,
     EXTRA,
     ISO,
+    MSL,
     TABLES,
     TIME,
     UNITS,
@@ -39,6 +40,7 @@ from boresight.types import FloatArray, Sensor
 
 MOST_PROBLEMS = 8  # of one file that are told at once
 EACH, STAMP, TURN, NORTH = "each row", "each stamp", "each turn", "north mark"
+PLACE = ("latitude_deg", "longitude_deg", "height_m", MSL)
 SCANS = (EACH, STAMP, TURN, NORTH)
 REQUIRED = {
     "detections": ("t_s", "sensor"),
@@ -64,6 +66,7 @@ class FileMap(TableModel, frozen=True):
     target: str | None = None
     scan: str | None = None
     time_offset_s: float = 0.0
+    geoid_height_m: float | None = None  # of the geoid above the ellipsoid: what heights above mean sea level need
 
 
 class MapTable(TableModel, frozen=True):
@@ -238,13 +241,20 @@ def converted(raw: Raw, of: FileMap, declared: Declaration) -> Table:
     wrong.raise_if_any()
     if of.time_offset_s:
         out["t_s"] = pa.array(out["t_s"].to_numpy(zero_copy_only=False) + of.time_offset_s, from_pandas=True)
+    _heights(out, of, wrong)
+    wrong.raise_if_any()
     _velocities(out)
+    keep = np.ones(len(raw), dtype=bool)
     if of.table == "detections":
-        _places(out, declared)
+        keep = _places(out, declared, raw, notes)
         if of.scan is not None:
             out["scan"] = pa.array(_scan_numbers(out, of, declared, wrong))
     wrong.raise_if_any()
-    table = Table(raw.path, pa.table(out), csv_lines=True, notes=notes)
+    data = pa.table({name: values for name, values in out.items() if name in TABLES[of.table]})
+    table = Table(raw.path, data, csv_lines=True, notes=notes)
+    if not keep.all():
+        lines = [(raw.path, i + 2) for i in np.flatnonzero(keep).tolist()]
+        table = Table(raw.path, data.filter(pa.array(keep)), True, notes, lines)
     return check_table(table, TABLES[of.table], REQUIRED[of.table])
 
 
@@ -316,6 +326,22 @@ def _values(out: Mapping[str, Any], name: str) -> FloatArray:
     return np.array(out[name].to_numpy(zero_copy_only=False), dtype=np.float64)
 
 
+def _heights(out: dict[str, Any], of: FileMap, wrong: Problems) -> None:
+    """Heights above mean sea level become heights above the ellipsoid."""
+    if MSL not in out:
+        return
+    if "height_m" not in out:
+        if of.geoid_height_m is None:
+            wrong.note(
+                "its heights are above mean sea level, those of recordings above the WGS84 ellipsoid: "
+                "give --geoid-height-m, the height of the geoid above the ellipsoid there (41 m in Hamburg, "
+                "-33 m in New York)"
+            )
+            return
+        out["height_m"] = pa.array(_values(out, MSL) + of.geoid_height_m, from_pandas=True)
+    out.pop(MSL)
+
+
 def _velocities(out: dict[str, Any]) -> None:
     """Speed and course become east and north, down becomes up."""
     from boresight.io import limits
@@ -337,28 +363,30 @@ def _velocities(out: dict[str, Any]) -> None:
         out.pop(name, None)
 
 
-def _places(out: dict[str, Any], declared: Declaration) -> None:
-    """Latitude and longitude of detections become east, north (and up) of the site."""
+def _places(out: dict[str, Any], declared: Declaration, raw: Raw, notes: list[str]) -> NDArray[np.bool_]:
+    """Latitude and longitude of detections become east, north (and up) of the site; returns the rows (n,) to keep."""
     from boresight.frames.local import enu_from_geodetic
     from boresight.io import limits
 
     if "latitude_deg" not in out or "longitude_deg" not in out:
-        for name in ("latitude_deg", "longitude_deg", "height_m"):
-            out.pop(name, None)
-        return
+        return np.ones(len(raw), dtype=bool)
     lat, lon = _values(out, "latitude_deg"), _values(out, "longitude_deg")
     given = "height_m" in out
     up = _values(out, "height_m") if given else np.full(len(lat), declared.site.height)
     bad = np.zeros(len(lat), dtype=bool)
     for name, values in (("latitude_deg", lat), ("longitude_deg", lon), ("height_m", up)):
-        bad |= limits.absent(name, values) | limits.outside(name, values) | np.isnan(values)
+        wrong = limits.absent(name, values) | limits.outside(name, values)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            why = limits.problem(name, float(values[row]))
+            notes.append(f"{raw.path}: line {row + 2}: {why}: {int(wrong.sum())} of {len(lat)} rows have no place")
+        bad |= wrong | np.isnan(values)
     place = np.full((3, len(lat)), np.nan)
     place[:, ~bad] = enu_from_geodetic(lat[~bad] * DEG, lon[~bad] * DEG, up[~bad], declared.site)
     out["x_m"], out["y_m"] = (pa.array(place[i], from_pandas=True) for i in (0, 1))
     if given and declared.dimensions == 3:
         out["z_m"] = pa.array(place[2], from_pandas=True)
-    for name in ("latitude_deg", "longitude_deg", "height_m"):
-        out.pop(name, None)
+    return ~bad
 
 
 def _scan_numbers(out: Mapping[str, Any], of: FileMap, declared: Declaration, wrong: Problems) -> NDArray[np.int64]:
@@ -420,7 +448,7 @@ def guess_map(
         if column is not None and column.name not in [c.name for c in found.values()]:
             found[name] = column
     table = table or _table_of({c.name for c in found.values()}, raw)
-    known = {*TABLES[table], *EXTRA}
+    known = {*TABLES[table], *(PLACE if table == "detections" else EXTRA)}
     if table in ("truth", "ignore", "platform"):
         other = {"x_m": "east_m", "y_m": "north_m", "z_m": "up_m"}
         found = {k: Column(other.get(c.name, c.name), c.unit) for k, c in found.items()}
@@ -548,12 +576,12 @@ def joined(tables: Sequence[Table], declared: Declaration, sort: bool) -> Table:
     """Return tables of one kind as one, by stamp if `sort`; notes say what was done."""
     notes = [note for t in tables for note in t.notes]
     if len(tables) == 1:
-        data, origin = tables[0].data, None
+        data, origin = tables[0].data, tables[0].origin
     else:
         names = list(dict.fromkeys(n for t in tables for n in t.data.column_names))
         data = pa.concat_tables([_with(t.data, names) for t in tables], promote_options="permissive")
         sizes = [len(t) for t in tables]
-        origin = [(t.path, i + 2) for t in tables for i in range(len(t))]
+        origin = [place for t in tables for place in (t.origin or [(t.path, i + 2) for i in range(len(t))])]
         notes.append(f"{', '.join(str(t.path) for t in tables)}: {' + '.join(map(str, sizes))} rows merged by stamp")
     out = Table(tables[0].path, data, csv_lines=True, notes=notes, origin=origin)
     if not sort:
@@ -601,6 +629,7 @@ def write_map(files: Iterable[FileMap], folder: Path | None = None) -> str:
         one: dict[str, Any] = {"path": str(path), "table": of.table, "separator": of.separator, "decimal": of.decimal}
         one |= {k: v for k in ("sensor", "platform", "target", "scan") if (v := getattr(of, k)) is not None}
         one |= {"time_offset_s": of.time_offset_s} if of.time_offset_s else {}
+        one |= {"geoid_height_m": of.geoid_height_m} if of.geoid_height_m is not None else {}
         one |= {"ignore": list(of.ignore)} if of.ignore else {}
         tables.append(write_toml({"file": [one]}).strip())
         tables[-1] += "\n\n[file.columns]\n" + "\n".join(f'{key(k)} = "{v}"' for k, v in of.columns.items())

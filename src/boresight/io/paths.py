@@ -20,7 +20,11 @@ PLATFORM_SCHEMA: dict[str, str] = {
     "platform": TEXT,
     **dict.fromkeys((*GEODETIC, *ENU, *YPR, *VELOCITY, "sigma_position_m", "sigma_attitude_deg"), NUMBER),
 }
-TRUTH_SCHEMA: dict[str, str] = {"t_s": NUMBER, "target": TEXT, **dict.fromkeys((*ENU, *VELOCITY), NUMBER)}
+TRUTH_SCHEMA: dict[str, str] = {
+    "t_s": NUMBER,
+    "target": TEXT,
+    **dict.fromkeys((*ENU, *VELOCITY, "sigma_position_m"), NUMBER),
+}
 IGNORE_SCHEMA: dict[str, str] = {
     "t_s": NUMBER,
     "object": TEXT,
@@ -29,7 +33,7 @@ IGNORE_SCHEMA: dict[str, str] = {
 
 
 def platforms_of(table: Table, site: Site, dimensions: int) -> tuple[PlatformTrack, ...]:
-    """Return the platforms of a table, positions in the site's east/north/up."""
+    """Return the platforms of a table, positions in the site's east/north/up; one of a single row is at rest there."""
     position = _platform_positions(table, site, dimensions)
     velocity = _columns(table, VELOCITY)
     ypr = _columns(table, YPR) * DEG
@@ -47,10 +51,9 @@ def platforms_of(table: Table, site: Site, dimensions: int) -> tuple[PlatformTra
         if np.isnan(ypr[rows, 1:]).all():  # a heading alone: the platform is taken as level
             ypr[rows, 1:] = np.where(np.isnan(ypr[rows, :1]), np.nan, 0.0)
         columns = (position[rows], velocity[rows], ypr[rows], sigma[rows], turn[rows])
-        came = arrived[rows]
-        out.append(
-            PlatformTrack(name, t, *columns, None if np.isnan(came).all() else np.where(np.isnan(came), t, came))
-        )
+        came = None if np.isnan(arrived[rows]).all() else np.where(np.isnan(arrived[rows]), t, arrived[rows])
+        at_rest = len(rows) == 1 and not np.nan_to_num(velocity[rows]).any()
+        out.append(PlatformTrack(name, t, *columns, came, at_rest))
     return tuple(out)
 
 
@@ -83,7 +86,13 @@ def _platform_positions(table: Table, site: Site, dimensions: int) -> FloatArray
 def truths_of(table: Table, dimensions: int) -> tuple[Truth, ...]:
     """Return the true paths of a table."""
     position, velocity = _positions(table, dimensions), _columns(table, VELOCITY)
-    return tuple(Truth(name, t, position[rows], velocity[rows]) for name, rows, t in _by_name(table, "target"))
+    sigma = table.checked("sigma_position_m") if "sigma_position_m" in table else None
+    if sigma is not None:
+        table.fail_where(sigma < 0, "sigma_position_m is {}; a standard deviation is not negative", sigma)
+    return tuple(
+        Truth(name, t, position[rows], velocity[rows], None if sigma is None else sigma[rows])
+        for name, rows, t in _by_name(table, "target")
+    )
 
 
 def ignored_of(table: Table) -> tuple[Ignore, ...]:
@@ -146,6 +155,8 @@ def truth_columns(truth: Sequence[Truth]) -> dict[str, Any]:
         "target": [p.target for p in truth for _ in p.t],
     }
     out |= _split(ENU, np.concatenate([p.position for p in truth]), always=True)
+    sigma = np.concatenate([np.full(len(p.t), np.nan) if p.sigma is None else p.sigma for p in truth])
+    out |= _split(("sigma_position_m",), sigma[:, None])
     return out | _split(VELOCITY, np.concatenate([p.velocity for p in truth]))
 
 

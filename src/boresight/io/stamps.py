@@ -23,6 +23,7 @@ FEW = 0.05  # of a sensor's reports may be wild; more are another clock
 LEAST_JUMP = 10.0  # s
 FAR = 1800.0  # s: an outermost stamp further off than this, and than ten times what the rest spans, is wild
 BEHIND = 600.0  # s: a report stamped further before those around it is wild, not late
+LARGEST = 1e11  # s: no date
 ANOTHER_EPOCH = 1e6  # s
 LONGEST_DELAY = 600.0  # s between stamp and arrival; more is another clock
 MOST_PARTS = 3000  # of one sensor's stamps between jumps; more is no clock at all
@@ -299,16 +300,24 @@ def _units(
         middle, step = float(np.median(np.abs(t[rows]))), _look_step(t, scan, rows)
         word = next((w for w, f in UNITS.items() if UNIX[0] * f <= middle <= UNIX[1] * f), None)
         why = "" if word is None else f": as seconds they lie in the year {middle / DAY / 365.25 + 1970:.0f}"
-        if word is not None and middle < 1e11:
+        if word is not None and middle < LARGEST:
             word = None
         if word is None and s.period is not None and math.isfinite(step):
             word = next((w for w, f in UNITS.items() if 0.5 <= step / (s.period * f) <= 2.0), None)
             why = f": looks are {step:.6g} apart, the declared period is {s.period:g} s"
+        if word is None and middle <= LARGEST:
+            continue
+        found.append(i)
+        rule, mend = "these are too large for seconds", "import with --time-unit (boresight import csv)"
         if word is not None:
-            found.append(i)
             rule = f"these look like {word}{why}"
             mend = f"import with --time-unit {UNIT_WORD[word]} (boresight import csv), or divide by {UNITS[word]:g}"
-            _say(out, s, "t_s", "unit", len(rows), math.nan, f"{rule}; {mend}")
+        if middle > LARGEST:
+            mend = f"not used: {mend}"
+            for row in rows.tolist():
+                out.refused[row] = f"its stamp t_s = {t[row]:.10g} {rule.split(' ', 1)[1].split(':')[0]}"
+                good[row] = False
+        _say(out, s, "t_s", "unit", len(rows), math.nan, f"{rule}; {mend}")
     return found
 
 

@@ -61,7 +61,9 @@ class Table:
             return np.full(len(self), default)
         column = self.data.column(name).combine_chunks()
         null = np.asarray(column.is_null())
-        values = np.array(column.cast(pa.float64()).fill_null(0.0).to_numpy(zero_copy_only=False), dtype=np.float64)
+        values = np.array(
+            column.cast(pa.float64(), safe=False).fill_null(0.0).to_numpy(zero_copy_only=False), dtype=np.float64
+        )
         word = "leave it empty" if self.csv_lines else "leave it null"
         self.fail_where(~np.isfinite(values), f"{name} is {{}}; {word} when not measured", values)
         if required:

@@ -23,17 +23,26 @@ class TableModel(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, froze
 def read_toml(path: Path | str) -> dict[str, Any]:
     """Read a TOML file into plain values; raises UserError with the line of a syntax error."""
     path = Path(path)
+    return toml_of(read_text(path), str(path))
+
+
+def toml_of(text: str, where: str) -> dict[str, Any]:
+    """Return the plain values of a TOML text, called `where` in errors; raises UserError."""
     try:
-        return tomllib.loads(read_text(path))
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise UserError(f"{path}: not valid TOML: {error}") from None
+        raise UserError(f"{where}: not valid TOML: {error}") from None
+    except RecursionError:
+        raise UserError(f"{where}: not valid TOML: tables or lists are nested too deeply") from None
 
 
 def convert(value: Any, model: type[T], where: str) -> T:
     """Convert plain values into a TableModel; raises UserError that names the key under `where`."""
-    _check_keys(value, msgspec.inspect.type_info(model), where, "")
     try:
+        _check_keys(value, msgspec.inspect.type_info(model), where, "")
         return msgspec.convert(value, model)
+    except RecursionError:
+        raise UserError(f"{where}: tables or lists are nested too deeply") from None
     except msgspec.ValidationError as error:
         text, _, place = str(error).partition(" - at `$")
         key = place.rstrip("`").lstrip(".")

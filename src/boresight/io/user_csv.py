@@ -10,12 +10,14 @@ import msgspec
 import numpy as np
 
 from boresight.errors import UserError, did_you_mean
+from boresight.io import reporting
 from boresight.io.columns import TABLES, TIME
 from boresight.io.declaration import Declaration, read_declaration
 from boresight.io.detections import reordered
 from boresight.io.mapping import FileMap, converted, guess_map, joined, plain_map, read_map, read_raw
 from boresight.io.recording import assemble
 from boresight.io.table import Table
+from boresight.io.toml import read_toml
 from boresight.types import Recording
 
 
@@ -28,6 +30,8 @@ class Options:
     time_unit: str | None = None  # of stamps that are numbers
     time_offset: Mapping[str, float] | None = None  # s, to add to the stamps of a sensor, or of "all"
     ignore_columns: Sequence[str] = ()
+    geoid_height: float | None = None  # m above the ellipsoid, for files with heights above mean sea level
+    far: bool = False  # platforms and sensors may lie any distance from the site
 
 
 def import_csv(
@@ -52,6 +56,8 @@ def import_csv(
     named = (("platform", platform), ("truth", truth), ("ignore", ignore))
     maps += [_map_of(path, table, declared, options, notes) for table, path in named if path is not None]
     tables: dict[str, list[Table]] = {name: [] for name in TABLES}
+    if options.geoid_height is not None:
+        maps = [msgspec.structs.replace(of, geoid_height_m=options.geoid_height) for of in maps]
     for of in maps:
         raw = read_raw(Path(of.path), of.separator, of.decimal)
         tables[of.table].append(_shifted(converted(raw, of, declared), of, options))
@@ -74,7 +80,15 @@ def import_csv(
     )
     if (np.diff(recording.detections.t_recv) < 0.0).any():  # logs laid end to end: the file's order is to be arrival's
         recording = reordered(recording)
-    return replace(recording, notes=(*notes, *recording.notes)), tuple(maps)
+    said = [*reporting.place_notes(recording, options.far), *reporting.coverage_notes(recording)]
+    recording, guessed = reporting.guess_reporting(recording, _says_reporting(sensors))
+    return replace(recording, notes=(*notes, *said, *guessed, *recording.notes)), tuple(maps)
+
+
+def _says_reporting(sensors: Path) -> set[str]:
+    """Ids of the sensors whose `reporting` is declared."""
+    tables = read_toml(sensors).get("sensor", [])
+    return {str(one.get("id")) for one in tables if isinstance(one, dict) and "reporting" in one}
 
 
 def file_maps(paths: Sequence[Path], declared: Declaration, options: Options, notes: list[str]) -> list[FileMap]:

@@ -10,7 +10,7 @@ from numba import njit
 from boresight.kernels.options import LEAF, PART
 from boresight.kernels.tracker import HIDDEN, STATIC, VISIBLE, IntArray, Look, Models, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_models import combine_models, condition_models
-from boresight.kernels.tracker_place import Places, fix_sensitivity
+from boresight.kernels.tracker_place import Places, fix_sensitivity, lacks_height, put_at_height
 from boresight.kernels.tracker_state import condition, factor, learners, whiten
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
@@ -75,7 +75,7 @@ def follow_blob(
     if models is None:
         draw_in(tr.x[i], tr.P[i], s.d, axes, sensor, look, fix, k)
     else:
-        for j in range(2):
+        for j in range(tr.mode.shape[1]):
             draw_in(tr.mode_x[i, j], tr.mode_P[i, j], s.d, axes, sensor, look, fix, k)
         combine_models(tr, i)
 
@@ -236,6 +236,25 @@ def moving_likelihood(
 
 
 @njit(**LEAF)
+def still_over_moving(
+    tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int, at: Places, room: Workroom
+) -> float:
+    """Log-likelihood of a detection's place if track `i` does not move, over that if it does; conditions the anchor.
+
+    A detection without height is put at the height of what it is held against: only in the plane does it say where.
+    """
+    level = lacks_height(look.z[k], s)
+    if level:
+        put_at_height(look, k, s, sensor, at, tr.x[i, 2])
+    moving = moving_likelihood(tr, i, s, sensor, look, k, at, room)
+    if level and not sensor.registers:
+        put_at_height(look, k, s, sensor, at, tr.anchor[i, 2])
+        for a in range(3):
+            room.fix[a] = at.fix[k, a]
+    return float(static_likelihood(tr, i, s, room.fix, at.covariance[k], room) - moving)
+
+
+@njit(**LEAF)
 def take(
     tr: Tracks,
     i: int,
@@ -252,14 +271,13 @@ def take(
 ) -> None:
     """Condition track `i` on detection `k`: state, anchor and hypotheses."""
     if at.there[k]:
-        moving = moving_likelihood(tr, i, s, sensor, look, k, at, room)
-        log_static += static_likelihood(tr, i, s, room.fix, at.covariance[k], room) - moving
+        log_static += still_over_moving(tr, i, s, sensor, look, k, at, room)
     if sensor.moves_tracks:
         considered = learners(tr, i, s, sensor)
         if models is None:
             condition(tr.x[i], tr.P[i], s.d, k, look, sensor, room, considered)
         else:
-            condition_models(tr, i, s, k, look, sensor, room, considered)
+            condition_models(tr, i, s, k, look, sensor, room, considered, models)
     weigh(tr, i, log_visible, log_static, temper)
     note_hit(tr, i, s, sensor, look.t + look.dt[k], sensor.moves_tracks)
 

@@ -23,6 +23,7 @@ class Sampled:
     present: NDArray[np.bool_]
     position: FloatArray
     covariance: FloatArray | None = None
+    sigma: FloatArray | None = None  # (n,) m per axis, of a target's position
 
 
 def clock_of(stamps: FloatArray) -> FloatArray:
@@ -41,7 +42,11 @@ def clock_of(stamps: FloatArray) -> FloatArray:
 def sample_truth(truth: Truth, clock: FloatArray, d: int) -> Sampled:
     """Interpolate a true path linearly; it is there from its first to its last stamp, and half a step beyond."""
     present = (clock >= truth.t[0] - STEP) & (clock <= truth.t[-1] + STEP)
-    return Sampled(truth.target, present, _interpolate(clock, truth.t, truth.position[:, :d]))
+    known = None if truth.sigma is None else np.isfinite(truth.sigma)
+    sigma = None
+    if truth.sigma is not None and known is not None and known.any():
+        sigma = np.interp(clock, truth.t[known], truth.sigma[known])
+    return Sampled(truth.target, present, interpolate(clock, truth.t, truth.position[:, :d]), sigma=sigma)
 
 
 def sample_tracks(rows: TrackRows, clock: FloatArray, d: int) -> list[Sampled]:
@@ -66,9 +71,10 @@ def sample_ignored(ignored: Ignore, clock: FloatArray) -> tuple[NDArray[np.bool_
     """Return whether an object without truth is there, its position (n, 2) and the radius (n,) around it (m)."""
     present = (clock >= ignored.t[0]) & (clock <= ignored.t[-1])
     radius = np.interp(clock, ignored.t, ignored.radius)
-    return present, _interpolate(clock, ignored.t, ignored.position), radius
+    return present, interpolate(clock, ignored.t, ignored.position), radius
 
 
-def _interpolate(clock: FloatArray, t: FloatArray, x: FloatArray) -> FloatArray:
+def interpolate(clock: FloatArray, t: FloatArray, x: FloatArray) -> FloatArray:
+    """Return rows of `x` (n, d) at the times `clock`, linearly between their own times `t` (n,)."""
     out: FloatArray = np.stack([np.interp(clock, t, x[:, k]) for k in range(x.shape[1])], axis=1)
     return out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from typing import Any
 
@@ -36,10 +37,7 @@ def losses(recording: Recording, decisions: DecisionRows) -> list[dict[str, Any]
 
 def _kind(reason: Any) -> str:
     """A reason without the numbers of its row."""
-    text = str(reason) if reason is not None else ""
-    if text.startswith("its stamp"):
-        return "its stamp is wild" if "wild" in text else "its stamp counts from another epoch than the others"
-    return text
+    return re.sub(r"its stamp t_s = \S+( \(.*? UTC\))?", "its stamp", str(reason or "")).split(":")[0]
 
 
 def loss_lines(recording: Recording, decisions: DecisionRows) -> list[str]:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from boresight.frames.tangent import direction_from_tangent
 from boresight.kernels.guide import EQUATOR, TRACK
 from boresight.kernels.guide_run import ACCEPTED, C_BEST
 from boresight.pointing.beam import Aim, aim_at
-from boresight.pointing.guide import EYE, NONE, THINNED, GuideFilter, GuideState
+from boresight.pointing.guide import EYE, NONE, THINNED, GuideSource, Predicted
 from boresight.pointing.mount import Mask, horizon_at
 from boresight.types import Site
 from boresight.types.sensor import FloatArray
@@ -54,6 +54,40 @@ class Pointing(NamedTuple):
     mount_elevation: float
 
 
+class Guide(Protocol):
+    """Where the target is: a `GuideFilter` of reports, or a track of the tracker (`follow.TrackGuide`)."""
+
+    @property
+    def sources(self) -> tuple[GuideSource, ...]:
+        """Who reports."""
+        ...
+
+    @property
+    def orbit(self) -> bool:
+        """Whether the target flies on an orbit."""
+        ...
+
+    def init(self) -> Any:
+        """Return the state before the first report."""
+        ...
+
+    def step(self, state: Any, source: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray) -> int:
+        """Take in one report; returns its fate."""
+        ...
+
+    def surprise(self, state: Any, source: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray) -> float:
+        """Return how far a report lies from the prediction."""
+        ...
+
+    def predict(self, state: Any, t: float) -> Predicted | None:
+        """Return the target at time `t` (s)."""
+        ...
+
+    def restart_now(self, state: Any) -> None:
+        """Forget the target."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Pointer:
     """Configuration of the chain.
@@ -64,7 +98,7 @@ class Pointer:
     (azimuth, elevation) (rad) in the axes the mount stands on.
     """
 
-    guide: GuideFilter
+    guide: Guide
     site: Site
     own: tuple[bool, ...]
     face: tuple[float, float, float] = (0.0, 0.5 * math.pi, 0.0)  # boresight azimuth, elevation, skew (rad)
@@ -243,7 +277,7 @@ class PointerState(NamedTuple):
     axis, of the last track of a source of tracks.
     """
 
-    guide: GuideState
+    guide: Any  # of its `Guide`
     last: FloatArray
     since: FloatArray
     spread: FloatArray

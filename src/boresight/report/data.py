@@ -46,6 +46,7 @@ def collect(results: Results, recording: Recording | None) -> dict[str, Any]:
     data["track_rows"] = len(results.tracks)
     if results.registration is not None:
         data["registration"] = _registration(results.registration, first)
+    data["notes"] = list(recording.notes) if recording is not None else summary.get("notes", [])
     data["outcome"] = _outcome(results.decisions, recording)
     if recording is not None:
         data |= _recorded(recording, results, first, last)

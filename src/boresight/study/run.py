@@ -10,7 +10,7 @@ import numpy as np
 from boresight.engine.track import run
 from boresight.frames.pose import pose_track
 from boresight.io.scans import iter_scans
-from boresight.metrics.score import score
+from boresight.metrics.score import CUT_OFF, score
 from boresight.models.motion import NearlyConstantVelocity
 from boresight.sim.actors import Drawn
 from boresight.sim.scenario import Scenario, simulate
@@ -29,7 +29,7 @@ def one_run(task: Task) -> dict[str, Any]:
     scenario, config = build(json.loads(task.scenario), json.loads(task.tracker), task.seed, "study")
     recording = simulate(scenario, np.random.default_rng(task.seed))
     _, rows, _ = run(tracker_for(recording, config), iter_scans(recording))
-    scored = score(recording, track_rows(rows))
+    scored = score(recording, track_rows(rows), cut_off=CUT_OFF)
     table = next(r for r in scored.rows if r["item"] == "tracks")
     squared = np.array([v for t in scored.targets for v in t.squared_error])
     times = [np.array(t.times) for t in scored.targets]

@@ -13,6 +13,7 @@ from boresight.tracking.config import TrackerConfig
 from boresight.tracking.names import Names
 from boresight.tracking.output import Decisions, Rows
 from boresight.tracking.tracker import REASON, Tracker, TrackerState
+from boresight.tracking.uncovered import why_uncovered
 from boresight.types import (
     FATES,
     NO_TRACK,
@@ -38,7 +39,7 @@ def tracker_for(recording: Recording, config: TrackerConfig, sensors: Sequence[s
         for p in recording.platforms
     }
     use = None if sensors is None else tuple(sorted(recording.sensor_index(name) for name in sensors))
-    return Tracker(config, recording.sensors, recording.dimensions, poses, use)
+    return Tracker(config, recording.sensors, recording.dimensions, poses, use, recording.site.height)
 
 
 def believed(tracker: Tracker, state: TrackerState) -> tuple[float, FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -78,7 +79,11 @@ def track_rows(rows: Sequence[Rows]) -> TrackRows:
 def decision_rows(recording: Recording, tracker: Tracker, decisions: Sequence[Decisions], names: Names) -> DecisionRows:
     """Give every row of the recording its fate, in file order, those that never reached the tracker included."""
     used = np.isin(recording.detections.sensor, tracker.used)
-    return fates_of(used, recording.duplicates & used, decisions, names, recording.refused)
+    out = fates_of(used, recording.duplicates & used, decisions, names, recording.refused)
+    blind = np.flatnonzero((out.fate == FATES.index(Fate.SCREENED)) & (out.reason == REASON[Fate.SCREENED]))
+    for row, why in why_uncovered(recording, tracker.poses, blind):
+        out.reason[row] = why
+    return out
 
 
 def fates_of(

@@ -16,7 +16,7 @@ from boresight.types.results import (
     no_tracks,
 )
 from boresight.types.scan import Scan, address_code, addresses_of
-from boresight.types.sensor import Coverage, FloatArray, Mount, Sensor, Site
+from boresight.types.sensor import Coverage, FloatArray, Mount, Sensor, Site, Station
 from boresight.types.state import GaussianState, Pose, UpdateInfo
 
 __all__ = [
@@ -47,6 +47,7 @@ __all__ = [
     "Sensor",
     "SensorKind",
     "Site",
+    "Station",
     "TrackRows",
     "TrackStatus",
     "Truth",

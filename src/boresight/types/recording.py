@@ -35,7 +35,10 @@ class Detections:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlatformTrack:
-    """Stamped navigation data of one platform; NaN where not given. `ypr` is yaw, pitch, roll (rad), NED to FRD."""
+    """Stamped navigation data of one platform; NaN where not given. `ypr` is yaw, pitch, roll (rad), NED to FRD.
+
+    `at_rest`: its one row holds for all times.
+    """
 
     id: str
     t: FloatArray  # (n,) s, ascending
@@ -45,6 +48,7 @@ class PlatformTrack:
     sigma_position: FloatArray  # (n,) m
     sigma_attitude: FloatArray  # (n,) rad
     t_recv: FloatArray | None = None  # (n,) s, when each arrived; None: with its stamp
+    at_rest: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,6 +59,7 @@ class Truth:
     t: FloatArray  # (n,) s, ascending
     position: FloatArray  # (n, 3) site ENU m
     velocity: FloatArray  # (n, 3) m/s, NaN where not given
+    sigma: FloatArray | None = None  # (n,) m per axis: the reference's own error, NaN where not given
 
 
 @dataclass(frozen=True, slots=True, eq=False)

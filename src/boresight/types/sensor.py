@@ -33,6 +33,14 @@ class Mount:
 
 
 @dataclass(frozen=True, slots=True)
+class Station:
+    """Where a fixed sensor stands: site east, north, up (m), and the rotation (3, 3) from its level axes."""
+
+    position: tuple[float, float, float]
+    enu_from_local: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True)
 class Coverage:
     """Where a sensor can see, in its own axes: range (m), azimuth and elevation (rad), each (low, high).
 
@@ -60,7 +68,8 @@ class Sensor:
     messages of one target, and `p_detection` the probability that a target reports at all when it is due.
     `p_wrong_id` is the probability that a `source_id` is not the target's own (None: 0.02 where reporting is SINGLE,
     else `source_id` is not used). `height` is the prior of the targets' height above the ellipsoid (mean and standard
-    deviation, m), for a sensor that does not measure it (None: what the elevation coverage allows).
+    deviation, m), for a sensor that does not measure it (None: what the elevation coverage allows). `station` is where
+    a sensor without a platform stands (None: at the site's origin); its axes are then those of the local level there.
     """
 
     id: str
@@ -77,6 +86,7 @@ class Sensor:
     reporting: Reporting = Reporting.SCAN
     p_wrong_id: float | None = None
     height: tuple[float, float] | None = None
+    station: Station | None = None
 
     @property
     def ranging(self) -> bool:
