@@ -338,6 +338,33 @@ def test_a_moving_target_with_everything_going_wrong(sims: list[Sim]) -> None:
         assert off < 5.0, (seed, told[-3:])
 
 
+def test_no_answer_however_wrong_breaks_it(sims: list[Sim]) -> None:
+    """5,000 answers of random bytes, and of answers with bytes changed, pieces lost and doubled."""
+    rng = np.random.default_rng(77)
+
+    def garbles(n: int, a: bytes) -> list[bytes]:
+        kind = rng.integers(6)
+        if kind == 0:
+            return [rng.integers(0, 256, int(rng.integers(0, 60)), dtype=np.uint8).tobytes()]
+        i, j = sorted(rng.integers(0, len(a) + 1, 2).tolist())
+        if kind == 1:
+            return [a[:i] + bytes([int(rng.integers(256))]) + a[i + 1 :]]
+        return [a[:i] + a[j:]] if kind == 2 else [a[:i] + a[i:j] * 2 + a[j:]] if kind == 3 else [a]
+
+    sims.append(sim := Sim(garbles=garbles))
+    begin, r = 0.0, Rotator(f"127.0.0.1:{sim.port}", MOUNT, BAND * DEG, PERIOD)
+    while sim.answers < 5000 and begin < 9e4:
+        drive(sim, lambda t: (200.0 * math.sin(0.01 * t), 40.0 + 30.0 * math.cos(0.02 * t)), 200.0, MOUNT, begin, r)
+        begin += 200.0
+    r.close()
+    assert sim.answers >= 5000
+    assert r.counts["garbage"] > 100
+    sim.garbles = lambda n, a: [a]
+    _, off, told = drive(sim, still(60.0, 45.0), 100.0, MOUNT, begin)
+    assert off < BAND
+    assert told[-1] == "rotator on"
+
+
 def test_rounding_does_not_leave_the_stops(sims: list[Sim]) -> None:
     odd = Mount((-100.00004 * DEG, 100.00004 * DEG), (5.00006 * DEG, 80.00004 * DEG), 20 * DEG, 20 * DEG)
     for to in ((170.0, 89.0), (-170.0, 0.0)):

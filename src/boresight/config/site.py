@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -10,6 +11,7 @@ from boresight.errors import UserError, did_you_mean
 from boresight.frames.array_face import Pole
 from boresight.io.files import read_text
 from boresight.io.toml import TableModel, convert, read_toml
+from boresight.kernels.guide import DIRECTION
 from boresight.pointing.elements import Satellite, label, read_elements
 from boresight.pointing.follow import TrackGuide
 from boresight.pointing.guide import GuideFilter, GuideSource
@@ -164,7 +166,10 @@ def read_site(path: Path) -> Station:
         raise UserError(f"{path}: attitude_coast_s = {file.attitude_coast_s:g} must not be negative")
     for one in file.source:
         _check_source(one, path, file.platform)
-    mount = mount_of(m)
+    try:
+        mount = mount_of(m)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
     elements = {one.id: _satellite(one, path) for one in file.source if one.tle is not None}
     return Station(file, Site(s.latitude_deg * DEG, s.longitude_deg * DEG, s.height_m), mount, elements)
 
@@ -238,6 +243,9 @@ def pointer_for(station: Station, recording: Recording | None = None) -> Pointer
         sources += [_source(s) for s in file.source if s.id not in known]
     if not sources:
         raise UserError("the site file has no [[source]]: say who reports")
+    may_be_off = [s.kind == DIRECTION and not (s.id in named and named[s.id].own) for s in sources]
+    if sum(may_be_off) > 1:  # of one alone an error cannot be told from the target's place
+        sources = [replace(s, suspect=off) for s, off in zip(sources, may_be_off, strict=True)]
     orbit = file.dynamics.kind == "orbit"
     q = file.dynamics.q if file.dynamics.q is not None else (1e-3 if orbit else 1.0)
     spread = (1e5, 8e3, 50.0) if orbit else (1e3, 300.0, 20.0)

@@ -2,8 +2,9 @@
 
 The frame is the Earth's at t = 0: ECEF turned by the Earth's rotation since then. A state is position, velocity, for
 near-constant acceleration also acceleration; then the constant biases of the sources that declare them (azimuth,
-elevation, range, time; every hypothesis estimates all of them); at its end the bias (along, across, up of the motion,
-m) of one source. There is one state per hypothesis: "no source is off", "source s is".
+elevation, range, time; every hypothesis estimates all of them); at its end what a hypothesis is about. There is one
+state per hypothesis: "no source is off"; "source s is", by a gross bias (along, across, up of the motion, m); and maybe
+"all are a little", by biases in angles and range that nobody declared.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ import numpy as np
 
 from boresight.config.site import OutputTable
 from boresight.engine.guide import GuideOutput
+from boresight.pointing.guide import biased
 from boresight.pointing.mount import Mount
 from boresight.pointing.pointer import Mode, Pointer, PointerState, Pointing
 from boresight.service.navigation import Navigation
@@ -118,10 +119,9 @@ def status_line(
         f"{s.id} {'–' if math.isinf(age) else f'{age:.1f}s'} {100.0 * weight:.0f}% ×{math.sqrt(scale):.2f}"
         for s, age, weight, scale in rows
     )
-    best = int(state.guide.clock[3])
-    biased = f"  {pointer.guide.sources[best - 1].id} is biased" if best else ""
+    who = biased(pointer.guide.sources, state.guide.clock)
     where = "" if rotator is None else f"  {rotator.told(p.t)}"
     aim = f"az {math.degrees(p.aim.azimuth):8.3f} el {math.degrees(p.aim.elevation):7.3f}"
     error = f"σ {math.degrees(p.aim.sigma):.3f}° P {p.aim.p_in_beam:.2f}"
     turned = "" if carrier is None else f"  {carrier.name} {carrier.age(p.t):.1f}s"
-    return f"{p.mode:6s} {aim} {error}  {sources}{turned}{biased}{where}   "
+    return f"{p.mode:6s} {aim} {error}  {sources}{turned}{who and f'  {who}'}{where}   "
