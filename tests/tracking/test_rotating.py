@@ -31,7 +31,7 @@ def test_looks_of_a_slow_turn_are_not_late() -> None:
 
 
 def test_a_fast_target_seen_at_its_own_time_is_not_taken_for_one_that_stands() -> None:
-    """A radar that turns in four seconds sees it up to two seconds before or after the look's own time: 400 m of way."""
+    """A radar that turns in four seconds sees it up to two seconds before or after the look's own time: 400 m."""
     sigma = np.full(7, np.nan)
     sigma[4:6] = 10.0
     used = Tracker(TrackerConfig(q=1.0, speed_sigma=150.0), (Sensor("radar", SensorKind.RADAR, sigma=sigma),), 2)

@@ -35,6 +35,7 @@ FIRST_REPORTS, FIRST_LOOKS = 6000, 4000  # at most, that the settings are made f
 SPEEDS = (1.5, 8.0, 40.0, 150.0, 600.0)  # m/s per axis: pedestrians, boats, cars, aircraft, missiles
 TURN_TIME = 15.0  # s in which a target may change its speed by as much as that, as a first guess
 FRAGMENT = 5.0  # reports that a track more must explain, to be worth it
+FASTER = 0.02  # share of the reports that faster targets must explain more, to be believed
 NOISES = np.exp(np.linspace(math.log(1e-4), math.log(3e3), 18))  # m²/s³
 STRETCH = 8  # reports over which a target is taken to move in one way
 FEW_STRETCHES = 12
@@ -57,21 +58,21 @@ def defaults_for(recording: Recording, sensors: Sequence[str] | None = None) -> 
     base = declared(used, spread, recording.dimensions)
     if not scans or spread is None:
         return base, ["settings: as declared by the sensors; no position in the first part to learn more from"]
-    best: tuple[float, float, TrackerConfig, DecisionRows] | None = None
+    best: tuple[float, TrackerConfig, DecisionRows, float] | None = None
     for speed in SPEEDS:
         config = with_speed(base, speed, recording.dimensions)
-        value, decisions = _explained(recording, scans, config, sensors)
-        if best is None or value > best[0]:
-            best = value, speed, config, decisions
+        value, decisions, moved = _explained(recording, scans, config, sensors)
+        if best is None or value > best[0] + FASTER * abs(best[0]):
+            best = value, config, decisions, moved
     assert best is not None
-    _, speed, config, decisions = best
+    _, config, decisions, moved = best
     span = scans[-1].t_recv - scans[0].t_recv
     lines = []
     found = _threads(recording, decisions, config, sensors)
     if found:
         for _ in range(2):
-            config = learned(config, found, recording.dimensions)
-            _, decisions = _explained(recording, scans, config, sensors)
+            config = replace(learned(config, found, recording.dimensions), speed_sigma=max(moved, SPEEDS[0]))
+            _, decisions, moved = _explained(recording, scans, config, sensors)
             found = _threads(recording, decisions, config, sensors) or found
         lines.append(f"settings from the innovations of {len(found)} tracks in the first {span:.0f} s:")
     else:
@@ -92,7 +93,7 @@ def told(config: TrackerConfig) -> list[str]:
 
 
 def declared(sensors: Sequence[Sensor], spread: float | None, dimensions: int) -> TrackerConfig:
-    """Return the settings that follow from noise and rates alone; `spread` (m) of a position, None: no sensor gives one.
+    """Return the settings that follow from noise and rates alone; `spread` (m) of a position, None where none is given.
 
     What stands wanders by a share of the noise in a period; two tracks nearer than the noise are one; what reports
     seldom lives and is hidden for longer.
@@ -168,12 +169,10 @@ def consistency(recording: Recording, decisions: DecisionRows) -> list[str]:
             continue
         mean = float(nis[of].sum() / total)
         if not BAND[0] <= mean <= BAND[1]:
-            cause = (
-                "errs more than is declared, or targets manoeuvre more" if mean > 1.0 else "errs less than is declared"
-            )
+            more, size = ("more", "small") if mean > 1.0 else ("less", "large")
             lines.append(
-                f"{sensor.id}: NIS per component {mean:.2f} (1 is right): it {cause}; the tracks' covariances are too "
-                f"{'small' if mean > 1.0 else 'large'} (`boresight tune` finds what fits)"
+                f"{sensor.id}: NIS per component {mean:.2f} where 1 is right: it errs {more} than is declared, or targets "
+                f"manoeuvre {more}; the tracks' covariances are too {size} (`boresight tune` finds what fits)"
             )
     return lines
 
@@ -190,7 +189,7 @@ def _first_part(recording: Recording, sensors: Sequence[str] | None) -> list[Sca
 
 
 def _spread(recording: Recording, scans: Sequence[Scan], sensors: Sequence[Sensor]) -> float | None:
-    """Return the standard deviation (m, per axis) of a position by the sensor that has the best; None where none has."""
+    """Return the standard deviation (m, per axis) of a position by the best sensor; None where none gives one."""
     out = []
     for sensor in sensors:
         number = recording.sensor_index(sensor.id)
@@ -210,13 +209,18 @@ def _spread(recording: Recording, scans: Sequence[Scan], sensors: Sequence[Senso
 
 def _explained(
     recording: Recording, scans: Sequence[Scan], config: TrackerConfig, sensors: Sequence[str] | None
-) -> tuple[float, DecisionRows]:
-    """Return how many reports shown tracks explain, each track more at the price of a few, and the decisions."""
+) -> tuple[float, DecisionRows, float]:
+    """Return how many reports shown tracks explain, each track at the price of a few; decisions; speed (m/s per axis).
+
+    The speed is half as much again as the root mean square of the tracks' velocities in the plane: few are faster.
+    """
     tracker = tracker_for(recording, config, sensors)
-    state, _, decisions = run(tracker, scans)
+    state, made, decisions = run(tracker, scans)
     rows = decision_rows(recording, tracker, decisions, state.names)
     taken = np.isin(rows.fate, [FATES.index(Fate.UPDATED), FATES.index(Fate.INITIATED)]) & (rows.track_id != NO_TRACK)
-    return float(taken.sum()) - FRAGMENT * len(np.unique(rows.track_id[taken])), rows
+    velocity = track_rows(made).velocity[:, :2]
+    speed = 1.5 * math.sqrt(float((velocity**2).mean())) if len(velocity) else 0.0
+    return float(taken.sum()) - FRAGMENT * len(np.unique(rows.track_id[taken])), rows, speed
 
 
 def _threads(
