@@ -17,7 +17,7 @@ import numpy as np
 
 from boresight.io.scans import iter_scans, selected
 from boresight.tracking.config import TrackerConfig
-from boresight.tracking.run import decision_rows, run, tracker_for
+from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
 from boresight.tracking.tuning import Thread, likelihoods, threads
 from boresight.types import (
     FATES,
@@ -171,8 +171,8 @@ def consistency(recording: Recording, decisions: DecisionRows) -> list[str]:
         if not BAND[0] <= mean <= BAND[1]:
             more, size = ("more", "small") if mean > 1.0 else ("less", "large")
             lines.append(
-                f"{sensor.id}: NIS per component {mean:.2f} where 1 is right: it errs {more} than is declared, or targets "
-                f"manoeuvre {more}; the tracks' covariances are too {size} (`boresight tune` finds what fits)"
+                f"{sensor.id}: NIS per component {mean:.2f} where 1 is right: it errs {more} than is declared, or "
+                f"targets manoeuvre {more}; the tracks' covariances are too {size} (`boresight tune` finds what fits)"
             )
     return lines
 
