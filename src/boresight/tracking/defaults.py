@@ -36,7 +36,7 @@ SPEEDS = (1.5, 8.0, 40.0, 150.0, 600.0)  # m/s per axis: pedestrians, boats, car
 TURN_TIME = 15.0  # s in which a target may change its speed by as much as that, as a first guess
 FRAGMENT = 5.0  # reports that a track more must explain, to be worth it
 FASTER = 0.02  # share of the reports that faster targets must explain more, to be believed
-NOISES = np.exp(np.linspace(math.log(1e-4), math.log(3e3), 18))  # m²/s³
+NOISES = np.exp(np.linspace(math.log(1e-4), math.log(1e5), 22))  # m²/s³
 STRETCH = 8  # reports over which a target is taken to move in one way
 FEW_STRETCHES = 12
 MANOEUVRING = 20.0  # times the quiet process noise, from which on two models are worth their time
@@ -65,15 +65,21 @@ def defaults_for(recording: Recording, sensors: Sequence[str] | None = None) -> 
         if best is None or value > best[0] + FASTER * abs(best[0]):
             best = value, config, decisions, moved
     assert best is not None
-    _, config, decisions, moved = best
+    value, config, decisions, moved = best
+    if value <= 0.0:
+        return base, ["settings: as declared by the sensors; nothing that moves in the first part to learn more from"]
     span = scans[-1].t_recv - scans[0].t_recv
     lines = []
     found = _threads(recording, decisions, config, sensors)
     if found:
         for _ in range(2):
             config = replace(learned(config, found, recording.dimensions), speed_sigma=max(moved, SPEEDS[0]))
-            _, decisions, moved = _explained(recording, scans, config, sensors)
+            value, decisions, moved = _explained(recording, scans, config, sensors)
             found = _threads(recording, decisions, config, sensors) or found
+        for wilder in livelier(config):  # tracks that were lost in a turn taught nothing of it
+            again, _, _ = _explained(recording, scans, wilder, sensors)
+            if again > value + 0.5 * FRAGMENT:
+                value, config = again, wilder
         lines.append(f"settings from the innovations of {len(found)} tracks in the first {span:.0f} s:")
     else:
         lines.append(f"settings for the speed that fits the first {span:.0f} s best (no track long enough for more):")
@@ -98,10 +104,15 @@ def declared(sensors: Sequence[Sensor], spread: float | None, dimensions: int) -
     What stands wanders by a share of the noise in a period; two tracks nearer than the noise are one; what reports
     seldom lives and is hidden for longer.
     """
-    config = TrackerConfig(hide_below=0.1)
+    flat = dimensions == 2
+    config = TrackerConfig(
+        q=0.1 if flat else 1.0,
+        speed_sigma=8.0 if flat else 150.0,
+        merge_distance=10.0 if flat else 30.0,
+        hide_below=0.2,
+    )
     if spread is None:
-        return replace(config, q=0.1 if dimensions == 2 else 1.0, speed_sigma=8.0 if dimensions == 2 else 150.0,
-                       merge_distance=10.0 if dimensions == 2 else 30.0)  # fmt: skip
+        return config
     periods = [s.period for s in sensors if s.period is not None] or [1.0]
     quick, slow = min(periods), max(periods)
     return replace(
@@ -151,6 +162,16 @@ def learned(config: TrackerConfig, found: list[Thread], dimensions: int) -> Trac
         config, q=float(NOISES[quiet]), q_manoeuvre=float(NOISES[wild]), manoeuvre_lasts=lasts,
         manoeuvre_every=lasts * (1.0 - share) / share,
     )  # fmt: skip
+
+
+def livelier(config: TrackerConfig) -> list[TrackerConfig]:
+    """Return settings with more process noise, in manoeuvres or in all."""
+    if config.q_manoeuvre is not None:
+        lasts = 3.0 * (config.manoeuvre_lasts or 10.0)
+        return [replace(config, q_manoeuvre=f * config.q_manoeuvre, manoeuvre_lasts=lasts) for f in (5.0, 25.0)]
+    q = config.q or NOISES[0]
+    wild = [replace(config, q_manoeuvre=f * q, manoeuvre_every=60.0, manoeuvre_lasts=10.0) for f in (50.0, 500.0)]
+    return [replace(config, q=5.0 * q), *wild]
 
 
 def consistency(recording: Recording, decisions: DecisionRows) -> list[str]:
