@@ -27,10 +27,12 @@ from boresight.types import (
     Fate,
     FloatArray,
     Recording,
+    Reporting,
     Scan,
     Sensor,
 )
 
+SURE = 0.1  # probability of a moving target below which one that reports itself is hidden
 FIRST_REPORTS, FIRST_LOOKS = 6000, 4000  # at most, that the settings are made from
 SPEEDS = (1.5, 8.0, 40.0, 150.0, 600.0)  # m/s per axis: pedestrians, boats, cars, aircraft, missiles
 TURN_TIME = 15.0  # s in which a target may change its speed by as much as that, as a first guess
@@ -102,14 +104,11 @@ def declared(sensors: Sequence[Sensor], spread: float | None, dimensions: int) -
     """Return the settings that follow from noise and rates alone; `spread` (m) of a position, None where none is given.
 
     What stands wanders by a share of the noise in a period; two tracks nearer than the noise are one; what reports
-    seldom lives and is hidden for longer.
+    seldom lives and is hidden for longer; what reports itself is no clutter, and is shown for longer while it stops.
     """
     flat = dimensions == 2
     config = TrackerConfig(
-        q=0.1 if flat else 1.0,
-        speed_sigma=8.0 if flat else 150.0,
-        merge_distance=10.0 if flat else 30.0,
-        hide_below=0.2,
+        q=0.1 if flat else 1.0, speed_sigma=8.0 if flat else 150.0, merge_distance=10.0 if flat else 30.0
     )
     if spread is None:
         return config
@@ -117,12 +116,13 @@ def declared(sensors: Sequence[Sensor], spread: float | None, dimensions: int) -
     quick, slow = min(periods), max(periods)
     return replace(
         config,
-        static_q=min((0.2 * spread) ** 2 / quick, 0.5),
+        static_q=min((0.2 * spread) ** 2 / quick, config.static_q),
         merge_distance=min(max(1.5 * spread, 0.3), 300.0),
         survival_time=max(120.0, 20.0 * slow),
         hide_time=max(120.0, 20.0 * slow),
         show_time=max(10.0, 2.0 * slow),
         coast_after=max(4.0, 2.5 * slow),
+        hide_below=SURE if any(s.reporting is Reporting.SINGLE for s in sensors) else config.hide_below,
     )
 
 
