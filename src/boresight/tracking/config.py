@@ -72,7 +72,7 @@ class TrackerConfig:
     hide_time: float = 120.0  # s, mean time for which a target stays visible
     show_time: float = 10.0  # s, mean time for which it stays hidden
     static_share: float = 0.3  # of new objects do not move (and are not reported)
-    static_q: float = 0.5  # m²/s, how an object that does not move may still wander
+    static_q: float = 0.1  # m²/s, how an object that does not move may still wander
     stop_floor: float = 0.02  # least weight of "it stands still" beside that of a moving target
     rest_time: float = 600.0  # s, mean time for which what stands stays so, until it sets off (inf: for ever)
     start_speed: float | None = None  # m/s, per axis, at about which it does (None: a quarter of speed_sigma)
