@@ -320,3 +320,20 @@ def test_a_recording_toml_is_proposed_where_there_is_none(tmp_path: Path) -> Non
     assert len(recording.platforms) == 1
     with pytest.raises(UserError, match="no file holds detections"):
         propose([tmp_path / "nav.csv"])
+
+
+def test_messages_that_share_a_stamp_by_chance_are_no_look(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    t, who = np.sort(rng.integers(0, 60, 120)), rng.integers(0, 20, 120)
+    rows = "".join(
+        f"{a},{211000000 + w},{54.0 + 0.01 * w},8.0\n" for a, w in zip(t.tolist(), who.tolist(), strict=True)
+    )
+    write(tmp_path, ais="t_s,mmsi,lat,lon\n" + rows)
+    recording = read(tmp_path, "ais", guess=True)
+    assert len(np.unique(recording.detections.scan)) == 120
+    assert recording.sensors[1].reporting is Reporting.SINGLE
+    every = "".join(f"{a},{w},{54.0 + 0.01 * w},8.0\n" for a in range(10) for w in range(20))
+    write(tmp_path, ais="t_s,icao24,lat,lon\n" + every)
+    recording = read(tmp_path, "ais", guess=True)
+    assert len(np.unique(recording.detections.scan)) == 10
+    assert recording.sensors[1].reporting is Reporting.SCAN
