@@ -217,6 +217,10 @@ class Tracker:
             raise UserError(f"Tracker: dimensions = {self.dimensions}; give 2 or 3")
         if not self.sensors or not all(isinstance(s, Sensor) for s in self.sensors):
             raise UserError("Tracker: give sensors = [boresight.sensor(…), …]")
+        ids = [s.id for s in self.sensors]
+        for name in ids:
+            if ids.count(name) > 1:
+                raise UserError(f"Tracker: sensor id '{name}' stands twice; give each sensor its own id")
         riding = [s.id for s in self.sensors if s.platform is not None]
         if riding:
             raise UserError(f"Tracker: sensor '{riding[0]}' rides on a platform; track a recording, or use serve")

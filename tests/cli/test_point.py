@@ -200,3 +200,26 @@ def test_a_camera_that_measures_azimuth_alone_makes_the_beam_better(run: Run, tm
     assert azimuth_only[1] < 1.3 * radar[1]
     assert both_angles[0] < 0.5 * radar[0]
     assert both_angles[1] < 0.5 * radar[1]
+
+
+def test_range_of_one_sensor_and_angles_of_another(run: Run, tmp_path: Path) -> None:
+    """A camera of both angles and a ranger without any: together they begin and hold the target."""
+    angles = CAMERA.format(elevation="sigma_elevation_deg = 0.05")
+    ranger = SCENARIO[SCENARIO.index("[[sensors]]") :].replace(
+        "sigma_azimuth_deg = 0.2\nsigma_elevation_deg = 0.2\n", ""
+    )
+    text = SCENARIO[: SCENARIO.index("[[sensors]]")] + ranger.replace('"radar"', '"ranger"', 1) + angles
+    (tmp_path / "s.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "site.toml").write_text(SITE, encoding="utf-8")
+    done = run("simulate", tmp_path / "s.toml", "-o", tmp_path / "rec", "--seed", 4)
+    assert done.code == 0, done.err
+    done = run("point", tmp_path / "site.toml", "--replay", tmp_path / "rec", "-o", tmp_path / "out")
+    assert done.code == 0, done.err
+    d = {k: np.array(v) for k, v in pq.read_table(tmp_path / "out" / "pointing.parquet").to_pydict().items()}
+    assert d["t_s"][0] < 3.0
+    truth = pq.read_table(tmp_path / "rec" / "truth.parquet").to_pydict()
+    p = np.stack([np.interp(d["t_aim_s"], truth["t_s"], truth[k]) for k in ("east_m", "north_m", "up_m")])
+    late = (d["t_s"] > 15.0) & (d["t_aim_s"] < 60.0)
+    off = (d["az_deg"] - np.degrees(np.arctan2(p[0], p[1])) + 180.0) % 360.0 - 180.0
+    assert np.median(np.abs(off[late])) < 0.1
+    assert set(d["mode"][late]) == {"fused"}

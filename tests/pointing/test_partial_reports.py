@@ -8,7 +8,7 @@ import pytest
 from boresight.errors import UserError
 from boresight.frames.local import ecef_from_enu, ecef_from_enu_rotation
 from boresight.kernels.guide_run import ACCEPTED, EMPTY, WAITING
-from boresight.pointing.guide import GuideFilter, GuideSource
+from boresight.pointing.guide import GuideFilter, GuideSource, Reports
 from boresight.types import Site
 
 DEG = np.pi / 180
@@ -213,3 +213,59 @@ def test_declared_biases_that_are_not_there_cost_little() -> None:
 def test_sources_that_cannot_be(given: dict[str, float], says: str) -> None:
     with pytest.raises(UserError, match=says):
         GuideSource("x", **given)
+
+
+@pytest.mark.parametrize(
+    ("source", "t", "z", "origin", "axes", "says"),
+    [
+        (3, 0.0, np.zeros(3), HERE, R, "there are 3"),
+        (-1, 0.0, np.zeros(3), HERE, R, "from 0 on"),
+        (0, np.nan, np.zeros(3), HERE, R, "time is nan"),
+        (0, np.inf, np.zeros(3), HERE, R, "time is inf"),
+        (0, 0.0, np.zeros(2), HERE, R, r"z has shape \(2,\)"),
+        (0, 0.0, np.zeros(6), HERE, R, r"z has shape \(6,\)"),
+        (0, 0.0, np.zeros((3, 1)), HERE, R, "z has shape"),
+        (0, 0.0, np.zeros(3), np.zeros(1), R, "origin has shape"),
+        (0, 0.0, np.zeros(3), HERE, np.eye(2), "axes has shape"),
+        (0, 0.0, ["a", 1, 2], HERE, R, "z is no array of numbers"),
+        (0, 0.0, None, HERE, R, "z"),
+    ],
+)
+def test_misuse_is_one_clear_error(source: int, t: float, z, origin, axes, says: str) -> None:
+    f = sources()
+    state = f.init()
+    assert f.step(state, 0, 0.0, [0.3, 0.2, 5000.0], HERE, R) == ACCEPTED  # lists are taken
+    kept = [a.copy() for a in state]
+    with pytest.raises(UserError, match=says):
+        f.step(state, source, t, z, origin, axes)
+    with pytest.raises(UserError, match=says):
+        f.surprise(state, source, t, z, origin, axes)
+    for a, b in zip(kept, state, strict=True):
+        np.testing.assert_array_equal(a, b)
+    with pytest.raises(UserError, match="another guide filter"):
+        f.step(GuideFilter((GuideSource("x", sigma_range=1.0),)).init(), 0, 0.0, np.zeros(3), HERE, R)
+    column = np.zeros(4)
+    good = Reports(np.zeros(4, np.int64), column, column, np.zeros((4, 3)), np.zeros((4, 3)), np.zeros((4, 3, 3)))
+    for bad in ({"source": np.full(4, 3)}, {"source": np.full(4, -1)}, {"z": np.zeros((4, 2))}, {"t": np.zeros(3)}):
+        with pytest.raises(UserError, match="reports: "):
+            f.run(good._replace(**bad), [0.0], [1.0])
+    with pytest.raises(UserError, match="as many aims"):
+        f.run(good, [0.0], [1.0, 2.0])
+
+
+def test_stamps_of_another_age_end_nothing() -> None:
+    """One of the year 2038, or one of an hour ago first: no hang, and the target is found again."""
+    at = azel(np.array([3000.0, 9000.0, 2500.0]))
+    f = sources()
+    for wrong in (1e18, 2.1e9, 3600.0, 100.0):
+        state = f.init()
+        for k in range(10):
+            f.step(state, 0, 0.1 * k, at, HERE, R)
+        f.step(state, 0, wrong, at, HERE, R)
+        for k in range(10, 40):
+            f.step(state, 0, 0.1 * k, at, HERE, R)
+        out = f.predict(state, 4.0)
+        assert out is not None
+        assert np.linalg.norm(out.position - ecef(np.array([3000.0, 9000.0, 2500.0]))) < 10.0
+        for t in (np.nan, np.inf, -np.inf, 1e18, 2e5):
+            assert f.predict(state, t) is None

@@ -193,7 +193,7 @@ def test_raw_data_beyond_the_limits_goes_the_oldest_first_and_is_counted_in_line
     assert [t for _, t, _, _ in gone] == [pytest.approx(0.1), pytest.approx(0.2)]
     waiting.add(0, 1.25, b"y" * 2000)
     assert len(waiting.beyond(1.25)) == 4
-    assert waiting.lines == waiting.bytes == 0
+    assert waiting.lines == waiting.size == 0
 
 
 def ask(port: int) -> tuple[float, float]:

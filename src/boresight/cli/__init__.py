@@ -38,6 +38,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "info": ("boresight.cli.info:info", "Say what is in a recording."),
     "export": ("boresight.cli.export:export", "Write tracks as CSV, GeoJSON or KML."),
     "convert": ("boresight.cli.convert:convert", "Turn pixels, az/el, ENU, NED, ECEF and geodetic into each other."),
+    "serve": ("boresight.cli.serve:serve", "Track live reports, log them, send the tracks on; follow one."),
+    "send": ("boresight.cli.send:send", "Send a recording as live JSON lines, at its own speed or faster."),
     "point": ("boresight.cli.point:point", "Point an antenna or beam at what the sources report."),
     "passes": ("boresight.cli.passes:passes", "List satellite passes, and whether the mount can follow."),
     "paper": ("boresight.cli.paper:app", "Print a paper's table: as printed, corrected, and ours."),

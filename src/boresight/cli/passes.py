@@ -123,7 +123,7 @@ def passes(
         if found.fails is not None:
             after = f"from {_iso(found.fails[0])} to {_iso(found.fails[1])}"
             (notes if found.highest == found.highest else refused).append(
-                f"{one.name}: its elements fail {after}: {found.reason}"
+                f"{one.name}: its elements fail {after}: {found.reason} (decayed, or too far from their epoch)"
             )
         rows += [_row(one, p, place, machine, beam_width_deg, dut1_s) for p in found.passes]
         if not found.passes and found.highest == found.highest:
@@ -143,7 +143,8 @@ def passes(
         print_json("passes", parameters, rows, told)
         return
     if rows:
-        print_table(COLUMNS, [_shown(row) for row in rows], f"passes over {site[0]:g}°, {site[1]:g}°", digits=4)
+        title = f"passes over {site[0]:g}°, {site[1]:g}° from {_iso(rows[0]['begin_s'])} UTC"
+        print_table(COLUMNS, [_shown(row) for row in rows], title, digits=4)
     for k in range(0, len(never), NAMED):
         print(f"never above {level} in these {hours:g} h: {', '.join(never[k : k + NAMED])}")
 
@@ -219,7 +220,7 @@ def _shown(row: dict[str, Any]) -> dict[str, Any]:
     follows = "no" if not row["can_follow"] else ("yes" if row["way"] == "upright" else "flip")
     return {
         "satellite": row["satellite"],
-        "rise": row["rise"] or ("always above" if always else edges[False]),
+        "rise": row["rise"][5:] if row["rise"] else ("always above" if always else edges[False]),
         "set": row["set"][11:] if row["set"] else ("" if always else edges[True]),
         "top": round(row["max_elevation_deg"], 1),
         "from": round(row["rise_az_deg"], 1),

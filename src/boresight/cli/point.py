@@ -106,12 +106,13 @@ def _live(
 ) -> dict[str, Any]:
     from boresight.config.site import pointer_for
     from boresight.io.files import read_text
+    from boresight.io.livelog import LogTable
     from boresight.service.live import run_live
     from boresight.service.signals import until_signalled
     from boresight.service.writing import new_log, said_ready
 
     pointer = pointer_for(station)
-    writer = None if log is None else new_log(log, read_text(site), "", force)
+    writer = None if log is None else new_log(log, read_text(site), "", force, LogTable())
     with until_signalled() as stop:
         status = None if quiet else sys.stderr
         return run_live(station, pointer, duration_s, status, stop=stop, log=writer, ready=said_ready)

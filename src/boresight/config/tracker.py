@@ -20,6 +20,7 @@ TRACKER_KEYS = {
     "manoeuvre_every_s": ("manoeuvre_every", 1.0),
     "manoeuvre_lasts_s": ("manoeuvre_lasts", 1.0),
     "speed_sigma_m_s": ("speed_sigma", 1.0),
+    "climb_sigma_m_s": ("climb_sigma", 1.0),
     "gate_probability": ("gate_probability", 1.0),
     "birth_rate": ("birth_rate", 1.0),
     "survival_time_s": ("survival_time", 1.0),
@@ -77,6 +78,7 @@ class TrackerTable(TableModel, frozen=True):
     manoeuvre_every_s: float | None = None
     manoeuvre_lasts_s: float | None = None
     speed_sigma_m_s: float | None = None
+    climb_sigma_m_s: float | None = None
     gate_probability: float | None = None
     birth_rate: float | None = None
     survival_time_s: float | None = None

@@ -41,7 +41,7 @@ class Portions:
 
 def arrival_of(item: Item) -> float:
     """Return an item's time of arrival (s)."""
-    return item[0].t_recv if isinstance(item, tuple) and not hasattr(item, "t_recv") else item.t_recv  # type: ignore[union-attr]
+    return item.t_recv if hasattr(item, "t_recv") else item[0].t_recv
 
 
 def in_order(*streams: Iterable[Item]) -> Iterator[Item]:

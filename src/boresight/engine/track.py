@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
@@ -11,7 +12,9 @@ from boresight.engine.loop import run as run_loop
 from boresight.engine.pipeline import Pipeline
 from boresight.engine.portions import MOST_LOOKS, Portions
 from boresight.io.jsonlines import Fix
+from boresight.kernels.tracker_rows import EMITTED, LONGEST_GAP
 from boresight.stages.protocol import Belief, Note
+from boresight.tracking.names import Names
 from boresight.tracking.output import Decisions, Rows
 from boresight.tracking.run import believed
 from boresight.tracking.tracker import Tracker, TrackerState
@@ -37,10 +40,15 @@ class TrackOutput(NamedTuple):
 
 
 class TrackState(NamedTuple):
-    """The tracker's state and the stages'."""
+    """The tracker's state and the stages'.
+
+    `names`: the tracks' numbers before rows were given for a time at which nothing had arrived, if there were any since
+    the newest arrival: with the end of a recording such rows are not its own.
+    """
 
     tracker: TrackerState
     held: list[Any]
+    names: Names | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +65,7 @@ class Tracking:
 
     def step(self, state: TrackState, items: Sequence[Item]) -> tuple[TrackState, TrackOutput]:
         """Take looks and navigation in order of arrival; a tick gives the rows due by then."""
-        now, held = state
+        now, held, names = state
         out = TrackOutput([], [], [], [], now)
         looks: list[Scan] = []
         for item in items:
@@ -67,15 +75,21 @@ class Tracking:
                 self.navigation.take(item)
         if looks:
             now, held = self._looks(now, held, looks, out)
+            names = None
         for item in reversed(items):
             if isinstance(item, Tick):
+                if names is None and now.window.clock.now[EMITTED] + LONGEST_GAP < item.t_recv:
+                    out.rows.extend(self.tracker.due(now, math.nextafter(now.arrival, math.inf)).rows)
+                    names = now.names.copy()
                 out.rows.extend(self.tracker.due(now, item.t_recv).rows)
                 break
-        return TrackState(now, held), out._replace(state=now)
+        return TrackState(now, held, names), out._replace(state=now)
 
     def finish(self, state: TrackState) -> tuple[TrackState, TrackOutput]:
         """Give the rows that the last arrival calls for, and the decisions still open."""
         notes = self.pipeline.finish(state.held)
+        if state.names is not None:
+            state.tracker.names = state.names
         now, left = self.tracker.finish(state.tracker)
         return TrackState(now, state.held), TrackOutput(left.rows, left.decisions, left.smoothed, notes, now)
 

@@ -36,7 +36,8 @@ class PoseTrack:
             `steps` (m - 1, 3) the turn from each to the next (rad, body axes).
         max_extrapolation: how far before the first and after the last stamp an answer is given (s).
         max_gap: the longest time between stamps over which an answer is given (s).
-        sigma_position, sigma_attitude: declared errors of one stamp (m per axis, rad per angle); 0 if none are.
+        sigma_position, sigma_attitude: (n,) and (m,) declared error of each stamp (m per axis, rad per angle); where a
+            stamp has none, that of the one before; 0 before the first.
         site: set if local level turns with the platform's place on the ellipsoid; None for a flat world.
     """
 
@@ -54,8 +55,8 @@ class PoseTrack:
     max_extrapolation: float
     max_gap: float
     site: Site | None
-    sigma_position: float = 0.0
-    sigma_attitude: float = 0.0
+    sigma_position: FloatArray
+    sigma_attitude: FloatArray
 
     @property
     def has_attitude(self) -> bool:
@@ -110,7 +111,8 @@ class PoseTrack:
             self, t=self.t[:n], arrived=self.arrived[:n], position=self.position[:n], velocity=velocity,
             measured=self.measured[:n], hermite=self.hermite[: max(n - 1, 0)], t_attitude=self.t_attitude[:m],
             arrived_attitude=self.arrived_attitude[:m], quaternion=self.quaternion[:m],
-            steps=self.steps[: max(m - 1, 0)],
+            steps=self.steps[: max(m - 1, 0)], sigma_position=self.sigma_position[:n],
+            sigma_attitude=self.sigma_attitude[:m],
         )  # fmt: skip
 
     def body_rate(self, t: ArrayLike) -> FloatArray:
@@ -186,7 +188,7 @@ def pose_track(
         platform.id, t, np.ascontiguousarray(arrived[have]), position, velocity, measured,
         measured[1:] & measured[:-1], t_attitude, np.ascontiguousarray(arrived[turned]), quaternion,
         rotations.steps_between(quaternion), max_extrapolation, max_gap, site,
-        _typical(platform.sigma_position), _typical(platform.sigma_attitude),
+        _carried_on(platform.sigma_position)[have], _carried_on(platform.sigma_attitude)[turned],
     )  # fmt: skip
 
 
@@ -252,6 +254,16 @@ def sensor_poses(
     return good & turned, *_mounted(sensor, track, position, velocity, R, rate)
 
 
+def has_pose(sensor: Sensor, track: PoseTrack | None) -> bool:
+    """Return whether a sensor on a platform can have a pose at all from what is known of that."""
+    if sensor.axes == Axes.SITE_ENU:
+        return True
+    if track is None or not len(track.t):
+        return False
+    turned = sensor.axes != Axes.PLATFORM_ENU or any(sensor.mount.lever_arm)
+    return track.has_attitude or not turned
+
+
 def _needs_attitude(sensor: Sensor, track: PoseTrack) -> bool:
     """Whether the sensor's pose depends on the platform's attitude; raises UserError if so and there is none."""
     needed = sensor.axes != Axes.PLATFORM_ENU or any(sensor.mount.lever_arm)
@@ -297,15 +309,19 @@ def add_navigation_noise(
     stamp up to `known` (s, also for each row) carries the noise of its extrapolation. Without declared errors the
     covariance comes back as it is.
     """
-    turns = sensor.axes not in (Axes.SITE_ENU, Axes.PLATFORM_ENU)
-    a = track.sigma_attitude if turns else 0.0
-    p = track.sigma_position if sensor.axes != Axes.SITE_ENU else 0.0
-    if not len(t) or (a == 0.0 and p == 0.0):
+    turns = track.has_attitude and sensor.axes not in (Axes.SITE_ENU, Axes.PLATFORM_ENU)
+    moves = len(track.t) > 0 and sensor.axes != Axes.SITE_ENU
+    if not len(t) or not ((turns and track.sigma_attitude.any()) or (moves and track.sigma_position.any())):
         return covariance
-    ahead = np.zeros(len(t), np.bool_)
-    if track.has_attitude and track.max_extrapolation < math.inf:
-        newest = np.searchsorted(track.arrived_attitude, np.broadcast_to(known, t.shape), side="right") - 1
-        ahead = t > track.t_attitude[np.maximum(newest, 0)]
+    by = np.broadcast_to(known, t.shape)
+    a, p, ahead = np.zeros(len(t)), np.zeros(len(t)), np.zeros(len(t), np.bool_)
+    if moves:
+        p = track.sigma_position[np.maximum(np.searchsorted(track.arrived, by, side="right") - 1, 0)]
+    if turns:
+        newest = np.maximum(np.searchsorted(track.arrived_attitude, by, side="right") - 1, 0)
+        a = track.sigma_attitude[newest]
+        if track.max_extrapolation < math.inf:  # else it is at rest, and never foretold
+            ahead = t > track.t_attitude[newest]
     angle2 = (a * np.where(ahead, FORETOLD, 1.0)) ** 2
     far = np.where(np.isnan(z[:, Component.RANGE]), np.inf, z[:, Component.RANGE])
     across = angle2 + (p / np.maximum(far, 1.0)) ** 2
@@ -320,9 +336,11 @@ def add_navigation_noise(
     return out
 
 
-def _typical(sigma: FloatArray) -> float:
-    known = sigma[np.isfinite(sigma)]
-    return float(np.median(known)) if len(known) else 0.0
+def _carried_on(sigma: FloatArray) -> FloatArray:
+    """Return (n,) each value, where it is NaN the last one before it, 0 before the first."""
+    known = np.isfinite(sigma)
+    last = np.maximum.accumulate(np.where(known, np.arange(len(sigma)), -1))
+    return np.where(last >= 0, sigma[np.maximum(last, 0)], 0.0)
 
 
 def _fixed(sensor: Sensor, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -107,7 +107,11 @@ class Declaration:
 def read_declaration(path: Path | str) -> Declaration:
     """Read and check a recording.toml; raises UserError that names file and key."""
     where = str(path)
-    table = convert(read_toml(path), RecordingTable, where)
+    return declaration_of(convert(read_toml(path), RecordingTable, where), where)
+
+
+def declaration_of(table: RecordingTable, where: str) -> Declaration:
+    """Check the tables of a recording.toml, called `where` in errors."""
     if table.format != 1:
         raise UserError(f"{where}: format = {table.format}; this version reads format = 1")
     if table.dimensions not in (2, 3):

@@ -81,6 +81,7 @@ class Line(Measured, frozen=True):
     yaw_deg: float | None = None
     pitch_deg: float | None = None
     roll_deg: float | None = None
+    sigma_attitude_deg: float | None = None
 
 
 MEASURED_NAMES = (*MEASURED, "latitude_deg", "longitude_deg", "height_m")
@@ -95,6 +96,8 @@ class Fix(NamedTuple):
     t: float  # s
     t_recv: float  # s
     row: FloatArray  # (9,) site ENU position (m), velocity (m/s), yaw, pitch, roll (rad); NaN where not given
+    sigma_position: float = math.nan  # m, of this stamp
+    sigma_attitude: float = math.nan  # rad
 
 
 class Refused(ValueError):
@@ -235,7 +238,7 @@ class LookDecoder:
             raise Refused("late_navigation", f"t_s = {t:.3f} is not later than the stamp before")
         self._newest_fix[name] = t
         health.count("accepted")
-        return Fix(name, t, arrival, row)
+        return Fix(name, t, arrival, row, *(_sigma(m, key) for key in ("sigma_position_m", "sigma_attitude_deg")))
 
     def _scan(self, m: Line, sensor: int, health: SourceHealth, arrival: float) -> Scan | None:
         assert m.t_s is not None
@@ -262,7 +265,7 @@ class LookDecoder:
             nothing = np.full((1, 2 * N_COMPONENTS), NAN)
             if self._repeated(sensor, np.array([t_look]), nothing, [None], [None], row)[0]:
                 return None
-            return Scan(sensor, t_look, arrival, *_NOTHING, (row,))
+            return Scan(sensor, t_look, arrival, *NOTHING, (row,))
         z = self._values(found, one)
         t = np.array([t_look if d.t_s is None else d.t_s + shift for d in found])
         if not (np.abs(t - t_look) <= self.oldest).all():
@@ -286,7 +289,7 @@ class LookDecoder:
                 return None
             z, t, R, rows = z[keep], t[keep], R[keep], rows[keep]
         middle = 0.5 * (float(t.min()) + float(t.max()))
-        names = [found[i].source_id for i in (rows - first)]
+        names = [found[i].source_id for i in (rows - first).tolist()]
         codes = None if not any(names) else np.array([address_code(name) for name in names], np.int64)
         return Scan(sensor, middle, arrival, t, z, R, rows, (), codes)
 
@@ -389,7 +392,8 @@ class LookDecoder:
         return out
 
 
-_NOTHING = (
+NOTHING = (  # t, z, covariance and row of a look that saw nothing
+
     np.zeros(0), np.zeros((0, N_COMPONENTS)), np.zeros((0, N_COMPONENTS, N_COMPONENTS)), np.zeros(0, np.int64),
 )  # fmt: skip
 
@@ -498,13 +502,10 @@ def navigation(m: Line, site: Site, flat: bool = False) -> FloatArray:
     row = np.full(9, math.nan)
     where = position(m, site, flat)
     if where is not None:
-        at, R = where
-        row[:3] = enu_from_ecef(float(at[0]), float(at[1]), float(at[2]), site)
-        if flat:
-            row[2] = 0.0
+        row[:3] = _site_enu(m, where[0], site, flat)
         v = velocity(m)
-        if v is not None:
-            row[3:6] = ecef_from_enu_rotation(site).T @ R @ v
+        if v is not None:  # site ENU, as in platform.parquet
+            row[3:6] = v if m.x_m is None or m.latitude_deg is not None else ecef_from_enu_rotation(site).T @ v
     yaw = known("yaw_deg", m.yaw_deg)
     if yaw is not None:
         pitch, roll = known("pitch_deg", m.pitch_deg) or 0.0, known("roll_deg", m.roll_deg) or 0.0
@@ -514,3 +515,28 @@ def navigation(m: Line, site: Site, flat: bool = False) -> FloatArray:
     if not (np.isfinite(row[:3]).all() or np.isfinite(row[6:]).all()):
         raise Refused("bad_value", "navigation needs a position, or yaw_deg")
     return row
+
+
+def _sigma(m: Line, key: str) -> float:
+    """Return the declared error of a stamp (SI), NaN where there is none; raises Refused."""
+    value = getattr(m, key)
+    if value is None:
+        return NAN
+    if not 0.0 < value < math.inf:
+        raise Refused("bad_value", f"{key} = {value:g}; a standard deviation is above zero")
+    return float(value) * DEG if key.endswith("_deg") else float(value)
+
+
+def _site_enu(m: Line, at: FloatArray, site: Site, flat: bool) -> FloatArray:
+    """Return a position (3,) as the rows of platform.parquet become one, bit for bit; `at` is it in ECEF (m)."""
+    if m.latitude_deg is not None and m.longitude_deg is not None:
+        height = site.height if m.height_m is None else m.height_m
+        lat, lon, up = (np.array([v], dtype=np.float64) for v in (m.latitude_deg * DEG, m.longitude_deg * DEG, height))
+        out: FloatArray = np.stack(enu_from_geodetic(lat, lon, up, site), axis=1)[0]
+    elif m.x_m is not None:
+        out = np.array(enu_from_ecef(float(at[0]), float(at[1]), float(at[2]), site))
+    else:
+        out = np.array([m.east_m, m.north_m, m.up_m or 0.0], dtype=np.float64)
+    if flat:
+        out[2] = 0.0 if m.latitude_deg is not None or m.up_m is None else m.up_m
+    return out

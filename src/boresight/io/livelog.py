@@ -16,10 +16,13 @@ from enum import IntEnum
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
+
 from boresight._version import __version__
 from boresight.errors import UserError
+from boresight.io.arrivals import OLDEST, TOLERANCE
 from boresight.io.files import read_text, reason
-from boresight.io.toml import TableModel, convert, read_toml
+from boresight.io.toml import TableModel, convert, read_toml, write_toml
 
 MARKER, SITE, SETTINGS = "log.toml", "site.toml", "tracker.toml"
 SEGMENT = 64 << 20  # bytes after which a new segment begins
@@ -50,13 +53,24 @@ class Record(NamedTuple):
     end: int  # where in the segment the next record begins
 
 
-class LogTable(TableModel, frozen=True):
-    """log.toml."""
+class PlatformTable(TableModel, frozen=True):
+    """One `[[platform]]`: the errors of its navigation (one stamp); platforms of sensors need none."""
 
-    format: int
+    id: str
+    sigma_position_m: float | None = None
+    sigma_attitude_deg: float | None = None
+
+
+class LogTable(TableModel, frozen=True):
+    """log.toml: how the lines of a run become reports."""
+
+    format: int = 1
     kind: str = "live log"
     version: str = ""
-    recorded_arrivals: bool = False
+    recorded_arrivals: bool = False  # lines carry their own arrival
+    oldest_s: float = OLDEST
+    clock_tolerance_s: float = TOLERANCE
+    platform: tuple[PlatformTable, ...] = ()
 
 
 def is_log(path: Path) -> bool:
@@ -173,15 +187,15 @@ def segments_of(folder: Path) -> list[int]:
     return sorted(int(p.stem) for p in folder.glob("*.bslog") if p.stem.isdigit())
 
 
-def create_log(folder: Path, site: str, settings: str, recorded: bool) -> LogWriter:
+def create_log(folder: Path, site: str, settings: str, about: LogTable) -> LogWriter:
     """Make a log folder with the texts that a replay needs; raises UserError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / SITE).write_text(site, encoding="utf-8")
-        (folder / SETTINGS).write_text(settings, encoding="utf-8")
-        marker = f'format = 1\nkind = "live log"\nversion = "{__version__}"\n'
-        marker += f"recorded_arrivals = {'true' if recorded else 'false'}\n"
-        (folder / MARKER).write_text(marker, encoding="utf-8")
+        (folder / SETTINGS).write_text(settings if settings.strip() else "[tracker]\n", encoding="utf-8")
+        told = msgspec.to_builtins(about) | {"format": about.format, "kind": about.kind, "version": __version__}
+        told["platform"] = [{k: v for k, v in p.items() if v is not None} for p in told.get("platform", [])]
+        (folder / MARKER).write_text(write_toml({k: v for k, v in told.items() if v != []}), encoding="utf-8")
     except OSError as error:
         raise UserError(f"{folder}: the log cannot be made ({reason(error)})") from None
     return LogWriter(folder, 1)

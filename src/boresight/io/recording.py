@@ -13,6 +13,7 @@ from boresight.io import detections as det
 from boresight.io import paths
 from boresight.io.declaration import Declaration, read_declaration, write_declaration
 from boresight.io.files import RECORDING, output_folder
+from boresight.io.livelog import is_log
 from boresight.io.stamps import newest
 from boresight.io.table import Table, read_table, write_table
 from boresight.types import Axes, Detections, PlatformTrack, Recording, Sensor
@@ -21,12 +22,17 @@ from boresight.types import Axes, Detections, PlatformTrack, Recording, Sensor
 def read_recording(path: Path | str) -> Recording:
     """Read and check a recording folder: SI, radians, the site's east/north/up; without a name it goes by its folder's.
 
-    Raises UserError with one line that names file, row or key, and what to do.
+    The log of a live run is read as the recording that gives the same tracks. Raises UserError with one line that names
+    file, row or key, and what to do.
     """
     folder = Path(path)
     if not folder.is_dir():
         what = "is a file, not a recording folder" if folder.exists() else "no such recording folder"
         raise UserError(f"{folder}: {what}")
+    if is_log(folder):
+        from boresight.io.logged import recording_of_log  # compiled code: loaded only where it is needed
+
+        return recording_of_log(folder)
     declared = read_declaration(folder / "recording.toml")
     declared = replace(declared, name=declared.name or folder.resolve().name)
     detections = read_table(folder / "detections.parquet", det.SCHEMA, det.REQUIRED)

@@ -23,12 +23,17 @@ class TableModel(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, froze
 def read_toml(path: Path | str) -> dict[str, Any]:
     """Read a TOML file into plain values; raises UserError with the line of a syntax error."""
     path = Path(path)
+    return toml_of(read_text(path), str(path))
+
+
+def toml_of(text: str, where: str) -> dict[str, Any]:
+    """Return the plain values of a TOML text, called `where` in errors; raises UserError."""
     try:
-        return tomllib.loads(read_text(path))
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise UserError(f"{path}: not valid TOML: {error}") from None
+        raise UserError(f"{where}: not valid TOML: {error}") from None
     except RecursionError:
-        raise UserError(f"{path}: not valid TOML: tables or lists are nested too deeply") from None
+        raise UserError(f"{where}: not valid TOML: tables or lists are nested too deeply") from None
 
 
 def convert(value: Any, model: type[T], where: str) -> T:

@@ -2,8 +2,9 @@
 
 The frame is the Earth's at t = 0: ECEF turned by the Earth's rotation since then. A state is position, velocity, for
 near-constant acceleration also acceleration; then the constant biases of the sources that declare them (azimuth,
-elevation, range, time; every hypothesis estimates all of them); at its end the bias (along, across, up of the motion,
-m) of one source. There is one state per hypothesis: "no source is off", "source s is".
+elevation, range, time; every hypothesis estimates all of them); at its end what a hypothesis is about. There is one
+state per hypothesis: "no source is off"; "source s is", by a gross bias (along, across, up of the motion, m); and maybe
+"all are a little", by biases in angles and range that nobody declared.
 """
 
 from __future__ import annotations
@@ -33,8 +34,9 @@ ROW_THEN, ROW_Y, ROW_LOOK, ROW_SECOND = 0, 1, 2, 3
 ROW_AXES, ROW_MOTION, ROW_A, ROW_BIAS, ROW_F = 4, 7, 10, 13, 19
 ROW_H, ROW_G, ROW_S, ROW_R, ROW_ROOM = 28, 34, 40, 46, 52
 ROWS, LEAST_WIDTH = 70, 12
-# Columns of row LOOK: where the report was made, what it says, and its variances. Of a position or track: the value.
-LOOK_ORIGIN, LOOK_Z, LOOK_VARIANCE, LOOK_ACROSS = 0, 3, 6, 9
+# Columns of row LOOK: where the report was made, what it says, its variances, and how far the prediction is (m). Of a
+# position or track: the value.
+LOOK_ORIGIN, LOOK_Z, LOOK_VARIANCE, LOOK_ACROSS, LOOK_FAR = 0, 3, 6, 9, 10
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
@@ -278,6 +280,7 @@ def compare_direction(bias_azimuth: float, bias_elevation: float, bias_range: fl
     """
     d0, d1, d2 = w[ROW_THEN, 0] - w[ROW_LOOK, 0], w[ROW_THEN, 1] - w[ROW_LOOK, 1], w[ROW_THEN, 2] - w[ROW_LOOK, 2]
     r = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    w[ROW_LOOK, LOOK_FAR] = r
     d0, d1, d2 = d0 / r, d1 / r, d2 / r
     azimuth, elevation = w[ROW_LOOK, LOOK_Z] - bias_azimuth, w[ROW_LOOK, LOOK_Z + 1] - bias_elevation
     both = not (math.isnan(azimuth) or math.isnan(elevation))

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from boresight.kernels.guide import (
     BIAS_TIME,
     DIRECTION,
     EARTH_RATE,
     LONGEST,
+    LOOK_FAR,
+    LOOK_Z,
     N_BIAS,
     ORBIT,
     ROW_A,
@@ -18,6 +22,7 @@ from boresight.kernels.guide import (
     ROW_F,
     ROW_G,
     ROW_H,
+    ROW_LOOK,
     ROW_MOTION,
     ROW_R,
     ROW_ROOM,
@@ -36,6 +41,7 @@ from boresight.kernels.options import PART
 from boresight.kernels.write import write_vector
 from boresight.types.sensor import FloatArray
 
+Columns = NDArray[np.int64]
 LOG_TURN = math.log(2.0 * math.pi)
 CLIP = 30.0  # NIS beyond which a report says no more about a hypothesis than that it does not fit
 
@@ -97,22 +103,22 @@ def condition(n: int, x: FloatArray, P: FloatArray, k: int, gate: float, w: Floa
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def update(
-    x: FloatArray, P: FloatArray, n: int, lag: float, biased: bool, first: int, offsets: FloatArray, dynamics: int,
-    q: float, kind: int, k: int, gate: float, w: FloatArray,
+    x: FloatArray, P: FloatArray, n: int, lag: float, biased: bool, at: Columns, dynamics: int, q: float, kind: int,
+    k: int, gate: float, w: FloatArray,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Condition the first `n` of a state on the report in `w` (`look_at`), in place.
 
-    `offsets` (4,) are the priors of the source's biases; the state holds those above zero from number `first` on.
-    `biased`: the last three of the state are the source's. The report is valid `lag` (s, <= 0) from the state's time:
-    the state is carried back, compared there, and the Jacobian carried forth: exact without process noise, which is
-    added to R for the lag. Returns NIS, log-likelihood (NIS clipped) and the share of R in S (what an adaptive noise
-    may learn from). Beyond `gate` the state stays.
+    `at` (4,): where the state holds the source's biases in azimuth, elevation, range and time (-1: it does not).
+    `biased`: the last three of the state are the source's gross bias. The report is valid `lag` (s, <= 0) from the
+    state's time: the state is carried back, compared there, and the Jacobian carried forth: exact without process
+    noise, which is added to R for the lag. Returns NIS, log-likelihood (NIS clipped) and the share of R in S (what an
+    adaptive noise may learn from). Beyond `gate` the state stays.
     """
     m = 6 if dynamics == ORBIT else 9
     then = w[ROW_THEN]
     for i in range(m):
         then[i] = x[i]
-    ba, be, br, bt = _held(x, first, offsets)
+    ba, be, br, bt = _held(x, at)
     advance(then, dynamics, lag - bt, w)
     if bt != 0.0:  # the report was turned to the inertial frame by its stamp
         _turn(then, EARTH_RATE * bt)
@@ -126,7 +132,7 @@ def update(
         compare_direction(ba, be, br, w)
     else:
         compare_position(dynamics, k, w)
-    _jacobian(biased, m, n, k, first, offsets, w)
+    _jacobian(biased, m, n, k, at, w)
     if n == 6:
         spread(6, P, k, w)
     elif n == 9:
@@ -139,8 +145,10 @@ def update(
         for i in range(k):
             a = w[ROW_S + i, i] - w[ROW_R + i, i]
             w[ROW_S + i, i] += w[ROW_SECOND, i] * a * a
-    if offsets[BIAS_TIME] > 0.0:
-        _time_by_velocity(P, first + _before(offsets), k, w)
+        if not math.isnan(w[ROW_LOOK, LOOK_Z + 2]):
+            _curvature(P, k - 1, w)
+    if at[BIAS_TIME] >= 0:
+        _time_by_velocity(P, at[BIAS_TIME], k, w)
     if lag < 0.0:
         _late(dynamics, q, -lag, k, w)
     share = 0.0
@@ -158,21 +166,12 @@ def update(
 
 
 @njit(**PART)
-def _held(x: FloatArray, first: int, offsets: FloatArray) -> tuple[float, float, float, float]:
+def _held(x: FloatArray, at: Columns) -> tuple[float, float, float, float]:
     """Return a source's biases in azimuth, elevation, range and time as a state holds them."""
-    ba, be, br, bt = 0.0, 0.0, 0.0, 0.0
-    j = first
-    if offsets[0] > 0.0:
-        ba = x[j]
-        j += 1
-    if offsets[1] > 0.0:
-        be = x[j]
-        j += 1
-    if offsets[2] > 0.0:
-        br = x[j]
-        j += 1
-    if offsets[3] > 0.0:
-        bt = x[j]
+    ba = x[at[0]] if at[0] >= 0 else 0.0
+    be = x[at[1]] if at[1] >= 0 else 0.0
+    br = x[at[2]] if at[2] >= 0 else 0.0
+    bt = x[at[3]] if at[3] >= 0 else 0.0
     return ba, be, br, bt
 
 
@@ -186,7 +185,7 @@ def _turn(x: FloatArray, angle: float) -> None:
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def _jacobian(biased: bool, m: int, n: int, k: int, first: int, offsets: FloatArray, w: FloatArray) -> None:
+def _jacobian(biased: bool, m: int, n: int, k: int, at: Columns, w: FloatArray) -> None:
     """Fill rows H (k, n) by the present state, of A by the position then and the transition F to then."""
     for i in range(min(k, 3)):
         a, b, c = w[ROW_A + i, 0], w[ROW_A + i, 1], w[ROW_A + i, 2]
@@ -200,22 +199,31 @@ def _jacobian(biased: bool, m: int, n: int, k: int, first: int, offsets: FloatAr
     for i in range(3, k):
         for j in range(n):
             w[ROW_H + i, j] = w[ROW_F + i, j] if j < m else 0.0
-    at = first
     for j in range(N_BIAS):
-        if offsets[j] > 0.0:
+        if at[j] >= 0:
             for i in range(k):
-                w[ROW_H + i, at] = w[ROW_BIAS + i, j]
-            at += 1
+                w[ROW_H + i, at[j]] = w[ROW_BIAS + i, j]
 
 
-@njit(**PART)
-def _before(offsets: FloatArray) -> int:
-    """Return how many biases a state holds of a source before the one in time."""
-    n = 0
-    for j in range(BIAS_TIME):
-        if offsets[j] > 0.0:
-            n += 1
-    return n
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def _curvature(P: FloatArray, row: int, w: FloatArray) -> None:
+    """Add to S and Y what the curvature of a sphere of equal range makes of the uncertainty across the line of sight.
+
+    Ranges are often known far better than directions: 40 km across at 20,000 km are 40 m along. Without this the first
+    ranges of several stations would be believed where their spheres do not cross.
+    """
+    trace, squares, along, twice = 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        v = 0.0
+        for j in range(3):
+            v += P[i, j] * w[ROW_A + row, j]
+            squares += P[i, j] * P[i, j]
+        trace += P[i, i]
+        along += v * w[ROW_A + row, i]
+        twice += v * v
+    r = w[ROW_LOOK, LOOK_FAR]
+    w[ROW_Y, row] -= 0.5 * (trace - along) / r
+    w[ROW_S + row, row] += 0.5 * (squares - 2.0 * twice + along * along) / (r * r)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
@@ -273,26 +281,28 @@ def bring_to(
 
 @njit(**PART)
 def start(
-    X: FloatArray, P: FloatArray, m: int, position: FloatArray, velocity: FloatArray, spread: FloatArray,
-    offsets: FloatArray, sigma_bias: FloatArray,
+    X: FloatArray, P: FloatArray, m: int, held: int, position: FloatArray, velocity: FloatArray, spread: FloatArray,
+    columns: Columns, priors: FloatArray, sigma_bias: FloatArray,
 ) -> None:  # fmt: skip
     """Set every hypothesis (h, n) to a position and velocity (3,) with wide variances `spread` (m, m/s, m/s²).
 
-    The biases (s, 4) and (s,) are as little known as their priors say.
+    The biases are as little known as their `priors` (2, s, 4) say at their `columns` (`guide_run.step`), and the gross
+    ones by `sigma_bias` (s,) from number `held` on.
     """
-    n = X.shape[1]
     X[:] = 0.0
     P[:] = 0.0
+    sources = len(sigma_bias)
     for h in range(len(X)):
         write_vector(X[h], position)
         write_vector(X[h, 3:], velocity)
         for i in range(m):
             P[h, i, i] = spread[i // 3] ** 2
-        at = m
-        for s in range(len(offsets)):
+        table = 1 if h > sources else 0
+        for s in range(sources):
             for j in range(N_BIAS):
-                if offsets[s, j] > 0.0:
-                    P[h, at, at] = offsets[s, j] ** 2
-                    at += 1
-        for i in range(n - 3, n):
-            P[h, i, i] = sigma_bias[h - 1] ** 2 if h > 0 else 0.0
+                at = columns[table, s, j]
+                if at >= 0:
+                    P[h, at, at] = priors[table, s, j] ** 2
+        if 0 < h <= sources:
+            for i in range(held, held + 3):
+                P[h, i, i] = sigma_bias[h - 1] ** 2

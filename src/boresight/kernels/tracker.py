@@ -57,9 +57,10 @@ class Tracks(NamedTuple):
     # message (s), mean time between two (s, 0: unknown), address (NO_ADDRESS: none yet), how many more had it than not
     pace: FloatArray  # (n_sensors, 4) of such sensors: mean time between two messages, and between two of one target
     # (s, 0: unknown); the time and the messages in the former
-    mode: PerModel = None  # (cap, 2) probabilities of the models of motion, and
-    mode_x: PerModel = None  # (cap, 2, n) their states, of which x and P are the moments
-    mode_P: PerModel = None  # (cap, 2, n, n)
+    mode: PerModel = None  # (cap, M) probabilities of the components of a target's state, 0: not in use. Component
+    # h J + j is that of height h and motion j of J; and
+    mode_x: PerModel = None  # (cap, M, n) their states, of which x and P are the moments
+    mode_P: PerModel = None  # (cap, M, n, n)
 
 
 class Look(NamedTuple):
@@ -105,6 +106,8 @@ class SensorTable(NamedTuple):
     interval: float  # s, declared mean time between two messages of one target; 0: not declared
     spoken: int  # its place in `Tracks.spoken`, -1 for none
     wrong_id: float  # probability that an address is not the target's own
+    height: float  # m above the ellipsoid, prior mean of what a target's height is where it is not measured, and
+    height_sigma: float  # m, its standard deviation; 0: anything that the elevation coverage allows
 
 
 class Settings(NamedTuple):
@@ -139,15 +142,19 @@ class Settings(NamedTuple):
     blob: float  # m, the largest resolution of the ranging sensors in use
     blob_share: float  # probability that a second bearing beside a shown track is a second target in its blob
     hide_after: float  # s without a hit after which a track is shown no more
+    climb_sigma: float  # m/s, prior vertical velocity of a new track whose height was not measured
+    site_height: float  # m, of the site above the ellipsoid
     extent: float  # m, per axis: from the point of a target that is reported to the one that is meant; in rows
 
 
 class Models(NamedTuple):
-    """The second model of a target's motion, where there is one: it manoeuvres now and then.
+    """Of how many components a target's state is the mixture: motions (quiet, manoeuvring) by heights.
 
-    None in its place leaves it out of the compiled code.
+    None in its place, where one of each will do, leaves it out of the compiled code.
     """
 
     q: float  # m²/s³, process noise during a manoeuvre (`Settings.q`: between them)
     every: float  # s, mean time from one's end to the next
     lasts: float  # s, mean time it lasts
+    motions: int = 2  # 1: nothing manoeuvres
+    heights: int = 1  # at most, along the arc on which a range and an azimuth leave a target

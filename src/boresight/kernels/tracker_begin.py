@@ -25,9 +25,17 @@ from boresight.kernels.tracker import (
     Settings,
     Tracks,
 )
+from boresight.kernels.tracker_heights import CELL, how_many, lift, narrow, prior_weight
 from boresight.kernels.tracker_messages import find_owned, forget_messages, note_message, part_told
-from boresight.kernels.tracker_models import begin_models
-from boresight.kernels.tracker_place import Places, fix_sensitivity
+from boresight.kernels.tracker_models import begin_component, begin_models, combine_models, give_up_heights
+from boresight.kernels.tracker_place import (
+    Places,
+    fix_sensitivity,
+    heights,
+    lacks_height,
+    place_covariance,
+    put_at_height,
+)
 from boresight.kernels.tracker_state import apply_update, innovation, linearise
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.kernels.write import write_matrix, write_vector
@@ -50,7 +58,6 @@ def begin(
     models: Models | None,
 ) -> None:
     """Begin a track at every detection with a position that no track took."""
-    d = s.d
     if tr.live[1] == 0:  # a first look full of targets must not pass for clutter: take them at their number
         spare = 0.0
         for k in range(len(look.dt)):
@@ -68,39 +75,17 @@ def begin(
     for k in range(len(look.dt)):
         if row_of_col[k] >= 0 or not at.there[k]:
             continue
-        fix, J, R, mask = at.fix[k], at.J[k], at.R[k], at.mask[k]
         i = new_track(tr, s, look, k, 1 << (sensor.number % 62))
-        x, P = tr.x[i], tr.P[i]
         if sensor.witness >= 0:
             tr.witness[i, sensor.witness, 0] = 1.0  # it does report this one
         if extras is not None:
             tell(tr, i, s, pooled)
-        for e in range(3):  # position covariance from noise and bias, and what it shares with the bias
-            b = sensor.bias[mask[e]]
-            for a in range(d):
-                if b >= 0:
-                    P[a, b] -= J[a, e] * P[b, b]
-                    P[b, a] = P[a, b]
-        dt = look.dt[k]
-        for a in range(d):
-            x[a] = fix[a]
-            tr.anchor[i, a] = fix[a]
-            P[d + a, d + a] = s.speed_sigma**2
-            P[a, d + a] = -dt * s.speed_sigma**2  # seen at its own time, kept at the look's
-            P[d + a, a] = P[a, d + a]
-            for b in range(d):
-                acc = 0.0
-                shared = 0.0
-                for e in range(3):
-                    for f in range(3):
-                        acc += J[a, e] * R[e, f] * J[b, f]
-                    bias = sensor.bias[mask[e]]
-                    if bias >= 0:
-                        shared += J[a, e] * P[bias, bias] * J[b, e]
-                P[a, b] = acc + shared + ((dt * s.speed_sigma) ** 2 if a == b else 0.0)
-                tr.anchor_P[i, a, b] = acc
-        if extras is not None and sensor.registers:
-            apply_constants(tr, i, s, look, k, sensor, fix, J, mask, room)
+        if models is not None and lacks_height(look.z[k], s):
+            begin_on_arc(tr, i, s, sensor, look, k, at, room, extras, models)
+        else:
+            first_state(tr, i, s, sensor, look, k, at, room, extras, look_has_height(look.z[k], s))
+            if models is not None:
+                begin_models(tr, i, models)
         density = tr.clutter[sensor.number, AZIMUTH_BINS]
         new = expected * (sensor.wrong_id if owned[k] > 0.0 else 1.0)
         born = max(new / (new + density), 5.0 * s.delete_below)
@@ -113,10 +98,104 @@ def begin(
         owner[k] = look.row[k]
         if sensor.spoken >= 0:
             note_message(tr, i, sensor, look.t + look.dt[k], look.address[k])
-        if math.isfinite(look.z[k, 3]):
-            condition_on_rate(tr, i, s, sensor, look, k, room)
-        if models is not None:
-            begin_models(tr, i, models)
+
+
+@njit(**LEAF)
+def look_has_height(z: FloatArray, s: Settings) -> bool:
+    """Whether a detection that gives a place gives its height too, or there is none to give."""
+    return bool(s.d == 2 or math.isfinite(z[2]) or math.isfinite(z[6]))
+
+
+@njit(**PART)
+def first_state(
+    tr: Tracks,
+    i: int,
+    s: Settings,
+    sensor: SensorTable,
+    look: Look,
+    k: int,
+    at: Places,
+    room: Workroom,
+    extras: Extras,
+    height_known: bool,
+) -> None:
+    """Give the new track `i` the place of detection `k` as `at` has it, and a velocity that nobody knows yet."""
+    d = s.d
+    fix, J, R, mask = at.fix[k], at.J[k], at.R[k], at.mask[k]
+    x, P = tr.x[i], tr.P[i]
+    for e in range(3):  # position covariance from noise and bias, and what it shares with the bias
+        b = sensor.bias[mask[e]]
+        for a in range(d):
+            if b >= 0:
+                P[a, b] -= J[a, e] * P[b, b]
+                P[b, a] = P[a, b]
+    dt = look.dt[k]
+    for a in range(d):
+        x[a] = fix[a]
+        tr.anchor[i, a] = fix[a]
+        speed = s.speed_sigma if height_known or a < 2 else s.climb_sigma
+        P[d + a, d + a] = speed**2
+        P[a, d + a] = -dt * speed**2  # seen at its own time, kept at the look's
+        P[d + a, a] = P[a, d + a]
+        for b in range(d):
+            acc = 0.0
+            shared = 0.0
+            for e in range(3):
+                for f in range(3):
+                    acc += J[a, e] * R[e, f] * J[b, f]
+                bias = sensor.bias[mask[e]]
+                if bias >= 0:
+                    shared += J[a, e] * P[bias, bias] * J[b, e]
+            P[a, b] = acc + shared + ((dt * speed) ** 2 if a == b else 0.0)
+            tr.anchor_P[i, a, b] = acc
+    if extras is not None and sensor.registers:
+        apply_constants(tr, i, s, look, k, sensor, fix, J, mask, room)
+    if math.isfinite(look.z[k, 3]):
+        condition_on_rate(tr, i, s, sensor, look, k, room)
+
+
+@njit(**PART)
+def begin_on_arc(
+    tr: Tracks,
+    i: int,
+    s: Settings,
+    sensor: SensorTable,
+    look: Look,
+    k: int,
+    at: Places,
+    room: Workroom,
+    extras: Extras,
+    models: Models,
+) -> None:
+    """Give the new track `i` several heights along the arc on which detection `k` leaves it (`tracker_heights`)."""
+    n, own = tr.x.shape[1], look.sensor_position[k, 2]
+    x, P = tr.x[i].copy(), tr.P[i].copy()
+    for c in range(tr.mode.shape[1]):
+        tr.mode[i, c] = 0.0
+    low, high = heights(look, k, s, sensor)
+    begin_, span = lift(look, k, low), lift(look, k, high) - lift(look, k, low)
+    count = how_many(span, narrow(look, k), models.heights)
+    width = span / count / CELL
+    for h in range(count):
+        angle = begin_ + span * (h + 0.5) / count
+        up = own + look.z[k, 0] * math.sin(angle)
+        share = math.cos(angle) * prior_weight(look, k, s, sensor, up, np.inf)  # every metre of height alike
+        for a in range(n):
+            tr.x[i, a] = x[a]
+            for b in range(n):
+                tr.P[i, a, b] = P[a, b]
+        put_at_height(look, k, s, sensor, at, up)
+        at.R[k, 2, 2] = width * width
+        place_covariance(at, k)
+        first_state(tr, i, s, sensor, look, k, at, room, extras, False)
+        begin_component(tr, i, h, max(share, 1e-12), models)
+    give_up_heights(tr, i, models)
+    combine_models(tr, i)
+    put_at_height(look, k, s, sensor, at, tr.x[i, 2])  # what does not move stands anywhere on the arc too
+    for a in range(3):
+        tr.anchor[i, a] = at.fix[k, a]
+        for b in range(3):
+            tr.anchor_P[i, a, b] = at.covariance[k, a, b]
 
 
 @njit(**LEAF)

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from boresight.kernels.options import LEAF, PART
 from boresight.kernels.registration import TIME
-from boresight.kernels.tracker import GATED, UNASSOCIATED, IntArray, Look, SensorTable, Settings, Tracks
+from boresight.kernels.tracker import GATED, UNASSOCIATED, IntArray, Look, Models, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_clutter import log_densities
+from boresight.kernels.tracker_heights import active_heights, fit
 from boresight.kernels.tracker_messages import find_owned, with_address
 from boresight.kernels.tracker_place import Places, fix_sensitivity
 from boresight.kernels.tracker_state import components, existence, innovation, linearise, log_determinant
@@ -91,6 +92,7 @@ def gate_all(
     fate: IntArray,
     owner: IntArray,
     nis_of: FloatArray,
+    models: Models | None,
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
     """Return the candidate list (start, column, cost, NIS, log(likelihood / clutter density)) of all tracks."""
     n_tracks = tr.live[0]
@@ -121,6 +123,9 @@ def gate_all(
         there = existence(tr, i, s, sensor)
         log_hit = log_miss = 0.0  # filled where they are needed: most tracks have no candidate
         last_pose, last_kind = -1, 0
+        several = False
+        if models is not None:
+            several = active_heights(tr, i, models) > 1
         first, last = 0, m
         reach = np.inf
         if near_only:
@@ -136,11 +141,15 @@ def gate_all(
             c = components(look.z[k], s.d, room.mask)
             if c == 0:
                 continue
-            kind = kind_of(room.mask, c)
-            if kind != last_kind or look.dt[k] != look.dt[last_pose]:
-                linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, c, room)
-                last_pose, last_kind = k, kind
-            nis = innovation(tr.P[i], look.z[k], look.R[k], c, room, s.d, sensor.constant[TIME])
+            if several:
+                nis, log_likelihood, c = fit(tr, i, s.d, k, look, sensor, sensor.constant[TIME], room)
+            else:
+                kind = kind_of(room.mask, c)
+                if kind != last_kind or look.dt[k] != look.dt[last_pose]:
+                    linearise(tr.x[i], s.d, k, look.dt[k], look, sensor, c, room)
+                    last_pose, last_kind = k, kind
+                nis = innovation(tr.P[i], look.z[k], look.R[k], c, room, s.d, sensor.constant[TIME])
+                log_likelihood = 0.0  # filled where it is needed
             if nis < near[k]:
                 near[k] = nis
                 if nis > s.gates[c]:
@@ -159,7 +168,9 @@ def gate_all(
             distance[used] = nis
             if used == start[i]:
                 log_hit, log_miss = math.log(there * p_d[i]), math.log(1.0 - there * p_d[i])
-            loglik[used] = -0.5 * (nis + log_determinant(c, room) + c * LOG_2PI) - log_density[k]
+            if not several:
+                log_likelihood = -0.5 * (nis + log_determinant(c, room))
+            loglik[used] = log_likelihood - 0.5 * c * LOG_2PI - log_density[k]
             if sensor.spoken >= 0:
                 loglik[used] = with_address(tr, i, sensor, look.address[k], owned[k], loglik[used], nis, p_d[i])
             cost[used] = log_miss - (log_hit + loglik[used])

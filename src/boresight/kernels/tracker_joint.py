@@ -14,10 +14,10 @@ from numba import njit
 from boresight.kernels.jpda import marginals
 from boresight.kernels.options import PART
 from boresight.kernels.tracker import HIDDEN, VISIBLE, IntArray, Look, Models, SensorTable, Settings, Tracks
-from boresight.kernels.tracker_models import combine_models, manoeuvring
+from boresight.kernels.tracker_models import LEAST_MODE, combine_models, give_up_heights
 from boresight.kernels.tracker_place import Places
 from boresight.kernels.tracker_state import condition, existence, learners, look_along
-from boresight.kernels.tracker_weigh import moving_likelihood, note_hit, static_likelihood, weigh
+from boresight.kernels.tracker_weigh import note_hit, still_over_moving, weigh
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.kernels.write import write_matrix, write_vector
 from boresight.types.sensor import FloatArray
@@ -115,8 +115,7 @@ def still_ratio(
     if not at.there[k]:
         return 1.0
     anchor, anchor_P = tr.anchor[i].copy(), tr.anchor_P[i].copy()
-    moving = moving_likelihood(tr, i, s, sensor, look, k, at, room)
-    ratio = math.exp(min(static_likelihood(tr, i, s, room.fix, at.covariance[k], room) - moving, 100.0))
+    ratio = math.exp(min(still_over_moving(tr, i, s, sensor, look, k, at, room), 100.0))
     if not update:
         write_vector(tr.anchor[i], anchor)
         write_matrix(tr.anchor_P[i], anchor_P)
@@ -150,7 +149,7 @@ def mix(
     if models is None:
         mixture(tr.x[i], tr.P[i], s.d, look, sensor, room, mine, beta, considered)
     else:
-        mix_by_model(tr, i, s.d, look, sensor, room, mine, beta, considered)
+        mix_by_model(tr, i, s.d, look, sensor, room, mine, beta, considered, models)
 
 
 @njit(cache=True)
@@ -164,29 +163,39 @@ def mix_by_model(
     mine: IntArray,
     beta: FloatArray,
     considered: int,
+    models: Models,
 ) -> None:
-    """The same for both models: each detection weighs the models by its likelihood, a miss leaves them."""
-    n = len(mine)
-    own = np.zeros((2, n))  # probability of each model and detection together
+    """The same for all components: each detection weighs them by its likelihood, a miss leaves them."""
+    n, parts = len(mine), tr.mode.shape[1]
+    own = np.zeros((parts, n))  # probability of each component and detection together
     left = 1.0
     for e in range(n):
         if beta[e] > 0.0:
-            _, log0 = look_along(tr.mode_x[i, 0], tr.mode_P[i, 0], d, mine[e], look, sensor, room)
-            _, log1 = look_along(tr.mode_x[i, 1], tr.mode_P[i, 1], d, mine[e], look, sensor, room)
-            manoeuvre = manoeuvring(tr.mode[i, 1], log1 - log0)
-            own[0, e], own[1, e] = (1.0 - manoeuvre) * beta[e], manoeuvre * beta[e]
+            best = -math.inf
+            for c in range(parts):
+                if tr.mode[i, c] > 0.0:
+                    _, log = look_along(tr.mode_x[i, c], tr.mode_P[i, c], d, mine[e], look, sensor, room)
+                    room.logs[c] = math.log(tr.mode[i, c]) + log
+                    best = max(best, room.logs[c])
+            total = 0.0
+            for c in range(parts):
+                if tr.mode[i, c] > 0.0:
+                    own[c, e] = max(math.exp(max(room.logs[c] - best, -700.0)), LEAST_MODE)
+                    total += own[c, e]
+            for c in range(parts):
+                own[c, e] *= beta[e] / total
             left -= beta[e]
-    for j in range(2):
-        total = max(left, 0.0) * tr.mode[i, j]
+    for c in range(parts):
+        if tr.mode[i, c] == 0.0:
+            continue
+        total = max(left, 0.0) * tr.mode[i, c]
         for e in range(n):
-            total += own[j, e]
+            total += own[c, e]
         for e in range(n):
-            own[j, e] /= total
-        mixture(tr.mode_x[i, j], tr.mode_P[i, j], d, look, sensor, room, mine, own[j], considered)
-        tr.mode[i, j] = total
-    both = tr.mode[i, 0] + tr.mode[i, 1]
-    tr.mode[i, 0] /= both
-    tr.mode[i, 1] /= both
+            own[c, e] /= total
+        mixture(tr.mode_x[i, c], tr.mode_P[i, c], d, look, sensor, room, mine, own[c], considered)
+        tr.mode[i, c] = total
+    give_up_heights(tr, i, models)
     combine_models(tr, i)
 
 

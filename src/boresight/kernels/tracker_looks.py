@@ -86,6 +86,8 @@ def sensor_at(sensors: Any, i: int) -> SensorTable:
         sensors.interval[i],
         sensors.spoken[i],
         sensors.wrong_id[i],
+        sensors.height[i],
+        sensors.height_sigma[i],
     )
 
 

@@ -64,7 +64,7 @@ def note_pace(tr: Tracks, sensor: SensorTable, elapsed: float, count: int) -> No
 def in_message(tr: Tracks, i: int, sensor: SensorTable, count: int) -> float:
     """Return the probability that one of `count` detections is of track `i`, if its target sends at all."""
     own = tr.spoken[i, sensor.spoken, INTERVAL]
-    return share_of_messages(sensor, tr.pace[sensor.number], count, own)
+    return float(share_of_messages(sensor, tr.pace[sensor.number], count, own))
 
 
 @njit(**LEAF)

@@ -16,6 +16,10 @@ from boresight.kernels.tracker import IntArray, Look, SensorTable, Settings
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
 
+TOP = 14_000.0  # m above the site: hardly an aircraft flies higher
+WIDE = 2.5  # standard deviations of a declared height, on either side
+EARTH = 6.371e6  # m
+
 
 class Places(NamedTuple):
     """Where in the world the detections of a look lie, if they say so."""
@@ -81,12 +85,14 @@ def position_fix(
     """Turn a ranging detection into a world position `fix` (3,) and `J` (3, m), its Jacobian by the components.
 
     Returns the number m of components used (written to `mask`), or 0 where the detection gives no position. Where
-    elevation is not measured, the middle of the sensor's elevation coverage stands for it, with its spread.
+    elevation is not measured, that of the middle of the heights at which the target may be stands for it.
     """
     z = look.z[k]
     R = look.enu_from_sensor[k]
     if math.isfinite(z[4]) and math.isfinite(z[5]):
         e, n, u = z[4], z[5], z[6] if math.isfinite(z[6]) else 0.0
+        if s.d == 3 and not math.isfinite(z[6]) and sensor.height_sigma > 0.0:
+            u = sensor.height - s.site_height - look.sensor_position[k, 2]
         for a in range(3):
             mask[a] = 4 + a
             for b in range(3):
@@ -94,24 +100,94 @@ def position_fix(
     elif math.isfinite(z[0]) and math.isfinite(z[1]):
         el = z[2]
         if not math.isfinite(el):
-            el = 0.0
             if s.d == 2:  # the target is in the plane up = 0: take the depression that follows from the range
                 drop = -look.sensor_position[k, 2]
                 el = math.asin(max(-1.0, min(1.0, drop / max(z[0], 1.0))))
+            elif math.isfinite(z[6]):  # a height beside range and azimuth, as transponders give it
+                el = math.asin(max(-1.0, min(1.0, z[6] / max(z[0], 1e-9))))
             else:
-                el = 0.5 * (sensor.elevation_low + sensor.elevation_high)
-        ce, se, ca, sa = math.cos(el), math.sin(el), math.cos(z[1]), math.sin(z[1])
-        e, n, u = z[0] * ce * sa, z[0] * ce * ca, z[0] * se
-        for a in range(3):
-            mask[a] = a
-            J[a, 0] = R[a, 0] * ce * sa + R[a, 1] * ce * ca + R[a, 2] * se
-            J[a, 1] = R[a, 0] * n - R[a, 1] * e
-            J[a, 2] = -R[a, 0] * z[0] * se * sa - R[a, 1] * z[0] * se * ca + R[a, 2] * z[0] * ce
+                low, high = heights(look, k, s, sensor)
+                el = elevation_at(look, k, 0.5 * (low + high))
+        polar_fix(look, k, el, fix, J, mask)
+        return 3
     else:
         return 0
     for a in range(3):
         fix[a] = look.sensor_position[k, a] + R[a, 0] * e + R[a, 1] * n + R[a, 2] * u
     return 3
+
+
+@njit(**LEAF)
+def polar_fix(look: Look, k: int, el: float, fix: FloatArray, J: FloatArray, mask: IntArray) -> None:
+    """Fill the world position of a range and an azimuth at elevation `el` (rad, sensor axes), and its Jacobian."""
+    z, R = look.z[k], look.enu_from_sensor[k]
+    ce, se, ca, sa = math.cos(el), math.sin(el), math.cos(z[1]), math.sin(z[1])
+    e, n, u = z[0] * ce * sa, z[0] * ce * ca, z[0] * se
+    for a in range(3):
+        mask[a] = a
+        J[a, 0] = R[a, 0] * ce * sa + R[a, 1] * ce * ca + R[a, 2] * se
+        J[a, 1] = R[a, 0] * n - R[a, 1] * e
+        J[a, 2] = -R[a, 0] * z[0] * se * sa - R[a, 1] * z[0] * se * ca + R[a, 2] * z[0] * ce
+        fix[a] = look.sensor_position[k, a] + R[a, 0] * e + R[a, 1] * n + R[a, 2] * u
+
+
+@njit(**LEAF)
+def lacks_height(z: FloatArray, s: Settings) -> bool:
+    """Whether a detection leaves its target on an arc of equal range: range and azimuth, in three dimensions."""
+    height = math.isfinite(z[2]) or math.isfinite(z[4]) or math.isfinite(z[6])
+    return bool(s.d == 3 and math.isfinite(z[0]) and math.isfinite(z[1]) and not height)
+
+
+@njit(**LEAF)
+def elevation_at(look: Look, k: int, up: float) -> float:
+    """Elevation (rad, sensor axes) at which the range and azimuth of detection `k` reach the height `up` (m, world)."""
+    z, R = look.z[k], look.enu_from_sensor[k]
+    level = R[2, 0] * math.sin(z[1]) + R[2, 1] * math.cos(z[1])  # level cos(el) + R22 sin(el) = (up - own) / range
+    steep = math.hypot(level, R[2, 2])
+    lift = (up - look.sensor_position[k, 2]) / max(z[0] * steep, 1e-9)
+    turn = math.acos(max(-1.0, min(1.0, lift)))
+    middle = math.atan2(R[2, 2], level)
+    return middle - turn if R[2, 2] >= 0.0 else middle + turn
+
+
+@njit(**LEAF)
+def height_to_up(look: Look, k: int, s: Settings, height: float) -> float:
+    """Return how far up (m, world) a height above the ellipsoid is where detection `k` is: the earth curves."""
+    own, far = look.sensor_position[k], look.z[k, 0]
+    up = height - s.site_height
+    level = max(far * far - (up - own[2]) ** 2, 0.0)
+    return float(up - level / (2.0 * EARTH))
+
+
+@njit(**LEAF)
+def heights(look: Look, k: int, s: Settings, sensor: SensorTable) -> tuple[float, float]:
+    """Return between which heights (m up, world) the target of a detection without elevation may be.
+
+    Within `WIDE` standard deviations of what is declared and not below the ground, as far as that leaves one of them;
+    else from the ground, or the sensor if that is lower, to where no aircraft flies, within the elevation coverage.
+    """
+    own, far = look.sensor_position[k, 2], look.z[k, 0]
+    reach = 0.999 * far
+    if sensor.height_sigma > 0.0:
+        middle = height_to_up(look, k, s, sensor.height)
+        low, high = middle - WIDE * sensor.height_sigma, middle + WIDE * sensor.height_sigma
+        ground = min(height_to_up(look, k, s, s.site_height), own)
+        low = max(low, min(ground, middle - sensor.height_sigma))
+    else:
+        low = min(height_to_up(look, k, s, s.site_height), own)
+        high = height_to_up(look, k, s, s.site_height + max(TOP, own + 0.25 * TOP))
+        low = max(low, own + far * math.sin(sensor.elevation_low))
+        high = min(high, own + far * math.sin(sensor.elevation_high))
+    low, high = max(low, own - reach), min(high, own + reach)
+    return (low, high) if low < high else (min(max(low, own - reach), own + reach) - 1.0, min(low, own + reach))
+
+
+@njit(**LEAF)
+def put_at_height(look: Look, k: int, s: Settings, sensor: SensorTable, at: Places, up: float) -> None:
+    """Put detection `k`, of range and azimuth, at the height `up` (m, world) in `at`."""
+    polar_fix(look, k, elevation_at(look, k, up), at.fix[k], at.J[k], at.mask[k])
+    component_covariance(look, k, s, sensor, at.mask[k], at.R[k])
+    place_covariance(at, k)
 
 
 @njit(**LEAF)
@@ -122,9 +198,14 @@ def component_covariance(look: Look, k: int, s: Settings, sensor: SensorTable, m
             value = look.R[k, mask[a], mask[b]]
             R[a, b] = value if math.isfinite(value) else 0.0
         if not math.isfinite(look.R[k, mask[a], mask[a]]):
-            spread = 500.0
-            if mask[a] == 2:
-                spread = min((sensor.elevation_high - sensor.elevation_low) / math.sqrt(12.0), 0.35)
+            spread = sensor.height_sigma if mask[a] == 6 and sensor.height_sigma > 0.0 else 500.0
+            if mask[a] == 2 and s.d == 3 and math.isfinite(look.z[k, 6]):
+                level = math.sqrt(max(look.z[k, 0] ** 2 - look.z[k, 6] ** 2, 1e-9))
+                spread = math.sqrt(look.R[k, 6, 6]) / level
+            elif mask[a] == 2 and s.d == 3:
+                low, high = heights(look, k, s, sensor)
+                spread = min((elevation_at(look, k, high) - elevation_at(look, k, low)) / math.sqrt(12.0), 0.35)
+                spread = max(spread, 1e-4)
             if s.d == 2:
                 spread = 1e-6
             R[a, a] = spread * spread
@@ -149,19 +230,27 @@ def places_of(look: Look, s: Settings, sensor: SensorTable, usable: NDArray[np.b
     mask = np.zeros((m, 3), np.int64)
     fix, matrices = np.zeros((m, 3)), np.zeros((3, m, 3, 3))
     J, R, cov = matrices[0], matrices[1], matrices[2]
+    at = Places(there, mask, fix, J, R, cov)
     for k in range(m):
         if not usable[k] or position_fix(look, k, s, sensor, fix[k], J[k], mask[k]) == 0:
             continue
         there[k] = True
         component_covariance(look, k, s, sensor, mask[k], R[k])
-        for a in range(3):
-            j0, j1, j2 = J[k, a, 0], J[k, a, 1], J[k, a, 2]
-            r0 = j0 * R[k, 0, 0] + j1 * R[k, 1, 0] + j2 * R[k, 2, 0]
-            r1 = j0 * R[k, 0, 1] + j1 * R[k, 1, 1] + j2 * R[k, 2, 1]
-            r2 = j0 * R[k, 0, 2] + j1 * R[k, 1, 2] + j2 * R[k, 2, 2]
-            for b in range(3):
-                cov[k, a, b] = r0 * J[k, b, 0] + r1 * J[k, b, 1] + r2 * J[k, b, 2]
-    return Places(there, mask, fix, J, R, cov)
+        place_covariance(at, k)
+    return at
+
+
+@njit(**LEAF)
+def place_covariance(at: Places, k: int) -> None:
+    """Fill the world covariance of detection `k`, J R J'."""
+    J, R, cov = at.J, at.R, at.covariance
+    for a in range(3):
+        j0, j1, j2 = J[k, a, 0], J[k, a, 1], J[k, a, 2]
+        r0 = j0 * R[k, 0, 0] + j1 * R[k, 1, 0] + j2 * R[k, 2, 0]
+        r1 = j0 * R[k, 0, 1] + j1 * R[k, 1, 1] + j2 * R[k, 2, 1]
+        r2 = j0 * R[k, 0, 2] + j1 * R[k, 1, 2] + j2 * R[k, 2, 2]
+        for b in range(3):
+            cov[k, a, b] = r0 * J[k, b, 0] + r1 * J[k, b, 1] + r2 * J[k, b, 2]
 
 
 @njit(**LEAF)

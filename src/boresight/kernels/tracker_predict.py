@@ -36,8 +36,10 @@ def predict_all(tr: Tracks, s: Settings, t: float, models: Models | None) -> Non
         q = s.q
         if models is not None:
             q = mix_models(tr, i, s, models, dt)
-            predict(tr.mode_x[i, 0], tr.mode_P[i, 0], s, dt, s.q, decay)
-            predict(tr.mode_x[i, 1], tr.mode_P[i, 1], s, dt, models.q, decay)
+            for c in range(tr.mode.shape[1]):
+                if tr.mode[i, c] > 0.0:
+                    noise = models.q if models.motions == 2 and c % 2 == 1 else s.q
+                    predict(tr.mode_x[i, c], tr.mode_P[i, c], s, dt, noise, decay)
         predict(tr.x[i], tr.P[i], s, dt, q, decay)
         for a in range(s.d):
             tr.anchor_P[i, a, a] += s.static_q * dt
@@ -66,7 +68,7 @@ def set_off(tr: Tracks, i: int, s: Settings, leaves: float, models: Models | Non
     if share > LEAST_SHARE and tr.heard[i] > 0:
         start_from(tr.x[i], tr.P[i], tr.anchor[i], tr.anchor_P[i], s, share)
         if models is not None:
-            for j in range(2):
+            for j in range(tr.mode.shape[1]):
                 start_from(tr.mode_x[i, j], tr.mode_P[i, j], tr.anchor[i], tr.anchor_P[i], s, share)
 
 

@@ -27,6 +27,7 @@ from boresight.kernels.tracker_begin import begin
 from boresight.kernels.tracker_clutter import learn_clutter
 from boresight.kernels.tracker_end import end_and_merge, show
 from boresight.kernels.tracker_gate import gate_all
+from boresight.kernels.tracker_heights import settle_heights
 from boresight.kernels.tracker_joint import shares, take_shares
 from boresight.kernels.tracker_messages import in_message, note_message, note_pace
 from boresight.kernels.tracker_place import covered, places_of, within
@@ -70,7 +71,9 @@ def scan_step(
         p_d[i] = detection_probability(tr.x[i], s.d, look, sensor)
         if sensor.single:
             p_d[i] *= in_message(tr, i, sensor, m)
-    start, column, cost, distance, loglik = gate_all(tr, s, sensor, look, usable, at, p_d, room, fate, owner, nis_of)
+    start, column, cost, distance, loglik = gate_all(
+        tr, s, sensor, look, usable, at, p_d, room, fate, owner, nis_of, models
+    )
     col_of_row = np.full(n_tracks, -1, np.int64)
     assign_sparse(start, column, cost, m, col_of_row)
     row_of_col = np.full(m, -1, np.int64)
@@ -124,12 +127,16 @@ def scan_step(
             continue
         if extras is not None and (sensor.joint or (tr.heard[i] == 0 and not sensor.ranging)):
             take_shares(tr, i, s, sensor, look, at, room, start, column, share, k, p_d[i], temper, models)
+            if models is not None and k >= 0 and models.heights > 1:
+                settle_heights(tr, i, s, sensor, look, k, models)
             continue
         p_seen = p_d[i] * reports(tr, i, sensor)
         log_visible, log_static = evidence(i, start, column, loglik, row_of_col, p_seen, sensor.sees_static)
         learn_reports(tr, i, sensor, log_visible, temper)
         if k >= 0:
             take(tr, i, s, sensor, look, k, at, room, log_visible, log_static, temper, models)
+            if models is not None and models.heights > 1:
+                settle_heights(tr, i, s, sensor, look, k, models)
         else:
             weigh(tr, i, log_visible, log_static, temper)
     if extras is not None and s.blob_share > 0.0 and unplaced(tr):

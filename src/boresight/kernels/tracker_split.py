@@ -234,7 +234,7 @@ def join(tr: Tracks, i: int, host: int, s: Settings) -> None:
 @njit(**LEAF)
 def join_models(tr: Tracks, i: int, host: int, s: Settings) -> None:
     """The same for the states of the models; track `i` manoeuvres as `host` does."""
-    for j in range(2):
+    for j in range(tr.mode.shape[1]):
         tr.mode[i, j] = tr.mode[host, j]
         x, P = tr.mode_x[host, j], tr.mode_P[host, j]
         join_state(tr.mode_x[i, j], tr.mode_P[i, j], x, P, tr.anchor[i], tr.anchor_P[i], s)

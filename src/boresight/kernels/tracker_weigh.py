@@ -10,7 +10,7 @@ from numba import njit
 from boresight.kernels.options import LEAF, PART
 from boresight.kernels.tracker import HIDDEN, STATIC, VISIBLE, IntArray, Look, Models, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_models import combine_models, condition_models
-from boresight.kernels.tracker_place import Places, fix_sensitivity
+from boresight.kernels.tracker_place import Places, fix_sensitivity, lacks_height, put_at_height
 from boresight.kernels.tracker_state import condition, factor, learners, whiten
 from boresight.kernels.tracker_workroom import Workroom
 from boresight.types.sensor import FloatArray
@@ -75,7 +75,7 @@ def follow_blob(
     if models is None:
         draw_in(tr.x[i], tr.P[i], s.d, axes, sensor, look, fix, k)
     else:
-        for j in range(2):
+        for j in range(tr.mode.shape[1]):
             draw_in(tr.mode_x[i, j], tr.mode_P[i, j], s.d, axes, sensor, look, fix, k)
         combine_models(tr, i)
 
@@ -190,7 +190,7 @@ def static_likelihood(tr: Tracks, i: int, s: Settings, fix: FloatArray, fix_R: F
 def moving_likelihood(
     tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int, at: Places, room: Workroom
 ) -> float:
-    """Log-likelihood of a world position under the moving track, biases included: the anchor's rival.
+    """Log-likelihood of a detection's place under the moving track, biases included: the anchor's rival.
 
     What the track knows of the sensor's constant errors is taken off `room.fix`, for the anchor's sake too.
     """
@@ -214,14 +214,15 @@ def moving_likelihood(
                 for a in range(d):
                     G[a, j] = C[a, p]
                     fix[a] -= C[a, p] * x[j]
+    dt = look.dt[k]  # the place is that of the detection's own time
     for a in range(d):
-        y[a] = fix[a] - x[a]
+        y[a] = fix[a] - x[a] - dt * x[d + a]
         for j in range(2 * d, n - s.n_constant):  # the constant errors are off already
             y[a] -= G[a, j] * x[j]
         for b in range(a + 1):
-            acc = at.covariance[k, a, b] + P[a, b]
+            acc = at.covariance[k, a, b] + P[a, b] + dt * (P[a, d + b] + P[d + a, b] + dt * P[d + a, d + b])
             for j in range(2 * d, n):
-                acc += P[a, j] * G[b, j] + G[a, j] * P[j, b]
+                acc += (P[a, j] + dt * P[d + a, j]) * G[b, j] + G[a, j] * (P[j, b] + dt * P[j, d + b])
                 for m in range(2 * d, n):
                     acc += G[a, j] * P[j, m] * G[b, m]
             L[a, b] = acc
@@ -233,6 +234,25 @@ def moving_likelihood(
     for a in range(d):
         value += y[a] * y[a]
     return -0.5 * value
+
+
+@njit(**LEAF)
+def still_over_moving(
+    tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int, at: Places, room: Workroom
+) -> float:
+    """Log-likelihood of a detection's place if track `i` does not move, over that if it does; conditions the anchor.
+
+    A detection without height is put at the height of what it is held against: only in the plane does it say where.
+    """
+    level = lacks_height(look.z[k], s)
+    if level:
+        put_at_height(look, k, s, sensor, at, tr.x[i, 2])
+    moving = moving_likelihood(tr, i, s, sensor, look, k, at, room)
+    if level and not sensor.registers:
+        put_at_height(look, k, s, sensor, at, tr.anchor[i, 2])
+        for a in range(3):
+            room.fix[a] = at.fix[k, a]
+    return float(static_likelihood(tr, i, s, room.fix, at.covariance[k], room) - moving)
 
 
 @njit(**LEAF)
@@ -252,14 +272,13 @@ def take(
 ) -> None:
     """Condition track `i` on detection `k`: state, anchor and hypotheses."""
     if at.there[k]:
-        moving = moving_likelihood(tr, i, s, sensor, look, k, at, room)
-        log_static += static_likelihood(tr, i, s, room.fix, at.covariance[k], room) - moving
+        log_static += still_over_moving(tr, i, s, sensor, look, k, at, room)
     if sensor.moves_tracks:
         considered = learners(tr, i, s, sensor)
         if models is None:
             condition(tr.x[i], tr.P[i], s.d, k, look, sensor, room, considered)
         else:
-            condition_models(tr, i, s, k, look, sensor, room, considered)
+            condition_models(tr, i, s, k, look, sensor, room, considered, models)
     weigh(tr, i, log_visible, log_static, temper)
     note_hit(tr, i, s, sensor, look.t + look.dt[k], sensor.moves_tracks)
 

@@ -29,6 +29,7 @@ class Workroom(NamedTuple):
     v: FloatArray  # (3,)
     errors: FloatArray  # (7, 5) the components by the sensor's constant errors
     C: FloatArray  # (3, 5) the world position by them
+    logs: FloatArray  # (32,) of the components
 
 
 def workroom(n: int) -> Workroom:
@@ -49,4 +50,5 @@ def workroom(n: int) -> Workroom:
         np.empty(3),
         np.empty((7, N_PARAMETERS)),
         np.empty((3, N_PARAMETERS)),
+        np.empty(32),
     )

@@ -25,14 +25,16 @@ THEORIES = {"1": "SGP", "4": "SGP4-XP", "5": "SDP8", "6": "a special-perturbatio
 MEANT = {"TIME_SYSTEM": "UTC", "REF_FRAME": "TEME", "CENTER_NAME": "EARTH"}
 ANGLES = ("INCLINATION", "RA_OF_ASC_NODE", "ARG_OF_PERICENTER", "MEAN_ANOMALY")
 UNITS = {"MEAN_MOTION": ("rev/day", "rev/d"), **dict.fromkeys(ANGLES, ("deg", "degree", "degrees"))}
-_EPOCH = re.compile(r"(\d{4})-(?:(\d{2})-(\d{2})|(\d{3}))T(\d{2}):(\d{2}):(\d{2})(?:\.(\d*))?Z?")
+_EPOCH = re.compile(r"(\d{4})-(?:(\d{2})-(\d{2})|(\d{3}))T(\d{2}):(\d{2}):(\d{2})(?:\.(\d*))?Z?", re.ASCII)
 _ONE = re.compile(
     r"1 [ \dA-HJ-NP-Z][ \d]{4}. .{8} [ \d]{2}[ \d]{3}\.[ \d]{8} [ +-]\.[ \d]{8} [ +-][ \d]{5}[ +-][ \d] "
-    r"[ +-][ \d]{5}[ +-][ \d] . [ \d]{4}[ \d]?"
+    r"[ +-][ \d]{5}[ +-][ \d] . [ \d]{4}[ \d]?",
+    re.ASCII,
 )
 _TWO = re.compile(
     r"2 [ \dA-HJ-NP-Z][ \d]{4} [ \d]{3}\.[ \d]{4} [ \d]{3}\.[ \d]{4} [ \d]{7} [ \d]{3}\.[ \d]{4} [ \d]{3}\.[ \d]{4} "
-    r"[ \d]{2}\.[ \d]{8}[ \d]{5}[ \d]?"
+    r"[ \d]{2}\.[ \d]{8}[ \d]{5}[ \d]?",
+    re.ASCII,
 )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from boresight.errors import UserError
 from boresight.frames.local import ecef_from_enu, ecef_from_enu_rotation
 from boresight.kernels.guide_run import N_CLOCK
 from boresight.pointing.guide import GuideSource, Predicted
@@ -37,6 +38,18 @@ class TrackGuide:
     def init(self) -> FollowState:
         """Return the state before there is a track."""
         return FollowState()
+
+    def step(
+        self, state: FollowState, source: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray
+    ) -> int:
+        """Refuse: a track is followed, and no report of its own taken."""
+        raise UserError("a pointer that follows a track takes no reports")
+
+    def surprise(
+        self, state: FollowState, source: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray
+    ) -> float:
+        """Refuse, as `step`."""
+        raise UserError("a pointer that follows a track takes no reports")
 
     def predict(self, state: FollowState, t: float) -> Predicted | None:
         """Return the track at time `t` (s) in ECEF, on a straight line; None while there is none."""

@@ -77,9 +77,15 @@ def _next_object(text: str, at: int) -> int:
 
 
 def _objects(found: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the messages in one object: itself, or those of a list in it."""
-    lists = [v for v in found.values() if isinstance(v, list) and v and all(isinstance(one, dict) for one in v)]
-    return [inner for v in lists for one in v for inner in _objects(one)] or [found]
+    """Return the messages in one object: itself, or those of the lists in it."""
+    inner: list[dict[str, Any]] = []
+    for v in found.values():
+        if isinstance(v, dict):
+            below = _objects(v)
+            inner += below if below != [v] else []
+        elif isinstance(v, list) and v and all(isinstance(one, dict) for one in v):
+            inner += [message for one in v for message in _objects(one)]
+    return inner or [found]
 
 
 def _flat(found: dict[str, Any]) -> tuple[dict[str, str], dict[str, str], str]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from boresight.config.site import OutputTable
 from boresight.engine.guide import GuideOutput
+from boresight.pointing.guide import biased
 from boresight.pointing.mount import Mount
 from boresight.pointing.pointer import Mode, Pointer, PointerState, Pointing
 from boresight.service.navigation import Navigation
@@ -83,11 +84,11 @@ class Commands:
     def counts(self) -> dict[str, Any]:
         """Return what was sent, what failed, and the last error of each output."""
         found: dict[str, Any] = {"ticks": self.ticks, "outputs": outputs(self.outs)}
-        return found | ({f"rotator_{k}": v for k, v in self.rotator.counts.items()} if self.rotator else {})
+        return found | (self.rotator.summary(self.clock()) if self.rotator else {})
 
     def _steady(self, p: Pointing) -> bool:
         """Return whether the mount's way can be foretold: it stands on the ground and does not search."""
-        return self.carrier is None and p.mode in (Mode.FUSED, Mode.OWN, Mode.COAST)
+        return self.carrier is None and p.mode in (Mode.FUSED, Mode.OWN, Mode.COAST, Mode.BELOW_HORIZON)
 
 
 def outputs(outs: list[LineOut]) -> dict[str, Any]:
@@ -118,10 +119,9 @@ def status_line(
         f"{s.id} {'–' if math.isinf(age) else f'{age:.1f}s'} {100.0 * weight:.0f}% ×{math.sqrt(scale):.2f}"
         for s, age, weight, scale in rows
     )
-    best = int(state.guide.clock[3])
-    biased = f"  {pointer.guide.sources[best - 1].id} is biased" if best else ""
-    where = "" if rotator is None else ("  rotator away" if rotator.position is None else "  rotator on")
+    who = biased(pointer.guide.sources, state.guide.clock)
+    where = "" if rotator is None else f"  {rotator.told(p.t)}"
     aim = f"az {math.degrees(p.aim.azimuth):8.3f} el {math.degrees(p.aim.elevation):7.3f}"
     error = f"σ {math.degrees(p.aim.sigma):.3f}° P {p.aim.p_in_beam:.2f}"
     turned = "" if carrier is None else f"  {carrier.name} {carrier.age(p.t):.1f}s"
-    return f"{p.mode:6s} {aim} {error}  {sources}{turned}{biased}{where}   "
+    return f"{p.mode:6s} {aim} {error}  {sources}{turned}{who and f'  {who}'}{where}   "

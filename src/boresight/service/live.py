@@ -37,6 +37,7 @@ class Chain:
     feed: Feed
     guiding: Guiding
     carrier: Navigation | None
+    elements: Elements
 
 
 def chain_for(station: Station, pointer: Pointer) -> Chain:
@@ -44,10 +45,10 @@ def chain_for(station: Station, pointer: Pointer) -> Chain:
     file = station.file
     stands = {s.id: Stand(Axes(s.axes), s.offset_enu_m, s.lever_arm_frd_m, s.latency_s) for s in file.source}
     carrier = None if file.platform is None else Navigation(file.platform, pointer, file.attitude_coast_s)
-    elements = Elements(pointer, station.elements)
+    elements = Elements(pointer, station.elements, {s.id: s.max_age_days for s in file.source})
     place = None if carrier is None else carrier.place
     guiding = Guiding(pointer, file.beam.rate_hz, place, elements.report)
-    return Chain(Feed(pointer, stands, carrier), guiding, carrier)
+    return Chain(Feed(pointer, stands, carrier), guiding, carrier, elements)
 
 
 def run_live(
@@ -68,6 +69,8 @@ def run_live(
     clock = clock if clock is not None else Clock()
     inputs = inputs_of(station)
     chain = chain_for(station, pointer)
+    if not inputs and not chain.elements.usable(clock()):
+        raise UserError(f"no [input], and no elements to guide: {chain.elements.told(clock())}: see max_age_days")
     commands = Commands(station.file.output, station.mount, pointer, clock, chain.carrier)
     watch = _Watch(chain, commands, clock, status)
     source = LiveSource(
@@ -96,6 +99,8 @@ def run_live(
         **watch.counts(),
         "core_share": (time.process_time() - busy) / wall,
         **chain.feed.counts,
+        **chain.elements.counts,
+        "elements": dict(chain.elements.faults),
         "overflow": sum(sum(one.values()) for one in lost.values()),
         "lost": lost,
         "sources": {name: h.words() for name, h in chain.feed.health.items() if h.words()},
@@ -150,7 +155,7 @@ class _Watch:
         line = status_line(self.chain.guiding.pointer, state, last, self.commands.rotator, self.chain.carrier)
         clocks = "  ".join(f"{name}: {h.words()}" for name, h in self.chain.feed.health.items() if h.words())
         failing = "  ".join(f"{out.name}: {out.error}" for out in self.commands.outs if out.error)
-        self.status.write("\r" + "  ".join(filter(None, (line, clocks, failing))))
+        self.status.write("\r" + "  ".join(filter(None, (line, clocks, self.chain.elements.told(now), failing))))
         self.status.flush()
 
     def counts(self) -> dict[str, Any]:

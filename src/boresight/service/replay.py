@@ -42,7 +42,7 @@ def replay(
     rate, coast = station.file.beam.rate_hz, station.file.attitude_coast_s
     poses = {p.id: pose_track(p, recording.site) for p in recording.platforms}
     carrier = _carrier(poses, station.file.platform)
-    elements = Elements(pointer, station.elements)
+    elements = Elements(pointer, station.elements, {s.id: s.max_age_days for s in station.file.source})
 
     def place(t: float) -> Place:
         assert carrier is not None

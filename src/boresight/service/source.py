@@ -44,20 +44,20 @@ class Waiting:
     most_wait: float = MOST_WAIT
     data: deque[tuple[int, float, bytes, int]] = field(default_factory=deque)  # input, arrival, bytes, lines
     lines: int = 0
-    bytes: int = 0
+    size: int = 0  # bytes
 
     def add(self, source: int, t: float, data: bytes) -> None:
         """Put bytes behind what waits."""
         n = lines_in(data)
         self.data.append((source, t, data, n))
         self.lines += n
-        self.bytes += len(data)
+        self.size += len(data)
 
     def beyond(self, now: float) -> list[tuple[int, float, bytes, int]]:
         """Take out what is beyond the limits, the oldest first."""
         out = []
         while self.data and (
-            self.lines > self.most_lines or self.bytes > self.most_bytes or now - self.data[0][1] > self.most_wait
+            self.lines > self.most_lines or self.size > self.most_bytes or now - self.data[0][1] > self.most_wait
         ):
             out.append(self.take())
         return out
@@ -66,7 +66,7 @@ class Waiting:
         """Take out the oldest."""
         one = self.data.popleft()
         self.lines -= one[3]
-        self.bytes -= len(one[2])
+        self.size -= len(one[2])
         return one
 
 

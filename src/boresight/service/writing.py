@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from boresight.errors import UserError
-from boresight.io.livelog import LogWriter, create_log, is_log
+from boresight.io.livelog import LogTable, LogWriter, create_log, is_log
 from boresight.service.sockets import Input
 
 
-def new_log(folder: Path, site: str, settings: str, force: bool, recorded: bool = False) -> LogWriter:
+def new_log(folder: Path, site: str, settings: str, force: bool, about: LogTable) -> LogWriter:
     """Begin a log; an existing one needs `force`. Raises UserError."""
     if folder.exists():
         inside = folder.is_dir() and any(folder.iterdir())
@@ -21,7 +21,7 @@ def new_log(folder: Path, site: str, settings: str, force: bool, recorded: bool 
         if inside and not force:
             raise UserError(f"{folder}: the log exists; give --force to replace it, or another folder")
         shutil.rmtree(folder)
-    return create_log(folder, site, settings, recorded)
+    return create_log(folder, site, settings, about)
 
 
 def said_ready(inputs: Sequence[Input]) -> None:

@@ -34,7 +34,7 @@ def told_of_compiling(say: Callable[[str], None]) -> Iterator[None]:
     """
     from numba.core.event import Event, Listener, install_listener
 
-    class Told(Listener):  # type: ignore[misc]  # Numba has no types
+    class Told(Listener):
         def on_start(self, event: Event) -> None:
             kernel = event.data["dispatcher"].py_func
             say(f"{kernel.__module__.removeprefix('boresight.')}.{kernel.__name__}")

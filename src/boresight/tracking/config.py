@@ -10,7 +10,7 @@ from boresight.errors import UserError, did_you_mean
 
 ASSOCIATIONS = ("nearest", "jpda")
 # what values may be; None is left out
-POSITIVE = ("survival_time", "hide_time", "show_time", "speed_sigma", "rest_time", "hide_after")
+POSITIVE = ("survival_time", "hide_time", "show_time", "speed_sigma", "climb_sigma", "rest_time", "hide_after")
 TIMES = ("manoeuvre_every", "manoeuvre_lasts")
 SHARES = ("static_share", "stop_floor", "doubt", "delete_below", "blob_share")
 NOT_NEGATIVE = (
@@ -64,6 +64,7 @@ class TrackerConfig:
     manoeuvre_every: float | None = None  # s, mean time from the end of a manoeuvre to the next (60)
     manoeuvre_lasts: float | None = None  # s, mean time that one lasts (10)
     speed_sigma: float | None = None  # m/s, prior velocity of a new track per axis (2-D: 8, 3-D: 150)
+    climb_sigma: float | None = None  # m/s, the same vertically where height is not measured (a tenth of speed_sigma)
     gate_probability: float = 0.999
     association: str = "nearest"  # or "jpda": tracks share the detections in their gates instead of taking one each
     birth_rate: float = 0.01  # new targets a look
@@ -71,7 +72,7 @@ class TrackerConfig:
     hide_time: float = 120.0  # s, mean time for which a target stays visible
     show_time: float = 10.0  # s, mean time for which it stays hidden
     static_share: float = 0.3  # of new objects do not move (and are not reported)
-    static_q: float = 0.5  # m²/s, how an object that does not move may still wander
+    static_q: float = 0.1  # m²/s, how an object that does not move may still wander
     stop_floor: float = 0.02  # least weight of "it stands still" beside that of a moving target
     rest_time: float = 600.0  # s, mean time for which what stands stays so, until it sets off (inf: for ever)
     start_speed: float | None = None  # m/s, per axis, at about which it does (None: a quarter of speed_sigma)

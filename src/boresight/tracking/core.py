@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from boresight.errors import UserError
 from boresight.kernels.registration import AZIMUTH, ELEVATION, N_PARAMETERS, RANGE, SCALE, TIME
@@ -19,6 +19,8 @@ from boresight.types import N_COMPONENTS, Component, FloatArray, Reporting, Sens
 
 MOST_SENSORS = 62  # bits of what each track was seen by
 START_SHARE = 0.25  # of the prior speed: with that, what stood sets off where nothing is said
+CLIMB_SHARE = 0.1  # of the prior speed: vertical, where no height was measured and nothing is said
+HEIGHTS = 10  # at most, along the arc on which a sensor without elevation leaves a target
 WRONG_ID = 0.02  # probability that an address is not the target's own, where nothing is said
 _BIASED = {
     Component.RANGE: "bias_range",
@@ -43,9 +45,16 @@ class Plan(NamedTuple):
 
 
 def make_plan(
-    config: TrackerConfig, sensors: tuple[Sensor, ...], dimensions: int, used: Sequence[int] | None = None
+    config: TrackerConfig,
+    sensors: tuple[Sensor, ...],
+    dimensions: int,
+    used: Sequence[int] | None = None,
+    site_height: float = 0.0,
 ) -> Plan:
-    """Pack a configuration for `sensors` in `dimensions` (2 or 3); biases are planned for those in `used` (all)."""
+    """Pack a configuration for `sensors` in `dimensions` (2 or 3); biases are planned for those in `used` (all).
+
+    `site_height` is that of the site above the ellipsoid (m).
+    """
     d = dimensions
     flat = d == 2
     taking = range(len(sensors)) if used is None else used
@@ -56,7 +65,7 @@ def make_plan(
     sigma: list[float] = []
     tau: list[float] = []
     tables = []
-    gate = math.sqrt(chi2.ppf(config.gate_probability, 1))
+    gate = math.sqrt(2.0 * gammaincinv(0.5, config.gate_probability))
     constants = [np.full(N_PARAMETERS, -1, np.int64) for _ in sensors]  # filled when the number of biases is known
     report_range = np.zeros(len(sensors))
     known: list[tuple[float, tuple[int, int]]] = []  # sigma, (sensor, parameter) of the constant errors
@@ -88,11 +97,14 @@ def make_plan(
     ranging = [t for t in tables if t.ranging and (used is None or t.number in used)]
     for table in ranging:
         report_range[table.number] = config.sensors.get(sensors[table.number].id, SensorErrors()).report_range
-    settings = _settings(config, d, np.array(sigma), np.array(tau), len(known), ranging, report_range)
+    settings = _settings(config, d, np.array(sigma), np.array(tau), len(known), ranging, report_range, site_height)
     n = 2 * d + len(sigma)
     extras = bool(known or config.blob_share > 0.0 or any(t.joint for t in tables)) or None
-    models = _models(config, settings.q)
-    empty = _before_all(settings, tables, n, len(witnesses), len(spoken), models is not None)
+    used_sensors = [sensor for index, sensor in enumerate(sensors) if used is None or index in used]
+    several = d == 3 and any(leaves_height_open(sensor) for sensor in used_sensors)
+    models = _models(config, settings.q, HEIGHTS if several else 1)
+    parts = 0 if models is None else models.motions * models.heights
+    empty = _before_all(settings, tables, n, len(witnesses), len(spoken), parts)
     return Plan(settings, tuple(tables), n, columns_of(tuple(tables)), empty, extras, models)
 
 
@@ -137,6 +149,8 @@ def _table(
         single=single,
         interval=(sensor.period or 0.0) if single else 0.0,
         spoken=-1,
+        height=sensor.height[0] if sensor.height is not None else 0.0,
+        height_sigma=sensor.height[1] if sensor.height is not None else 0.0,
         wrong_id=sensor.p_wrong_id if sensor.p_wrong_id is not None else (WRONG_ID if single else 0.0),
     )
 
@@ -149,6 +163,7 @@ def _settings(
     n_constant: int,
     ranging: Sequence[SensorTable],
     report_range: FloatArray,
+    site_height: float,
 ) -> Settings:
     """Pack the settings; `ranging` are the ranging sensors in use, `report_range` (n_sensors,) theirs, 0 of others."""
     flat = d == 2
@@ -156,7 +171,7 @@ def _settings(
     return Settings(
         d=d,
         q=config.q if config.q is not None else (0.1 if flat else 1.0),
-        gates=np.array([0.0, *chi2.ppf(config.gate_probability, np.arange(1, 8))]),
+        gates=np.array([0.0, *(2.0 * gammaincinv(0.5 * np.arange(1, 8), config.gate_probability))]),
         speed_sigma=speed,
         birth_rate=config.birth_rate,
         survival_time=config.survival_time,
@@ -183,19 +198,27 @@ def _settings(
         blob=max([t.resolution for t in ranging], default=0.0),
         blob_share=config.blob_share,
         hide_after=config.hide_after,
+        climb_sigma=config.climb_sigma if config.climb_sigma is not None else CLIMB_SHARE * speed,
+        site_height=site_height,
         extent=config.extent,
     )
 
 
-def _models(config: TrackerConfig, q: float) -> Models | None:
-    """Pack the model of manoeuvres, if there is one; `q` is the process noise between them."""
+def leaves_height_open(sensor: Sensor) -> bool:
+    """Whether a sensor measures range and azimuth without elevation: in 3-D, its targets lie anywhere on an arc."""
+    measured = np.isfinite(sensor.sigma)
+    return bool(measured[Component.RANGE] and measured[Component.AZIMUTH] and not measured[Component.ELEVATION])
+
+
+def _models(config: TrackerConfig, q: float, heights: int) -> Models | None:
+    """Pack the components of a target's state, if there are several; `q` is the process noise between manoeuvres."""
     if config.q_manoeuvre is None:
-        return None
+        return None if heights == 1 else Models(q=q, every=1.0, lasts=1.0, motions=1, heights=heights)
     if not q < config.q_manoeuvre < math.inf:
         told = f"finite and larger than {q:g}, the process noise between manoeuvres"
         raise UserError(f"tracker: q_manoeuvre must be {told}, not {config.q_manoeuvre:g}")
     every, lasts = config.manoeuvre_every or 60.0, config.manoeuvre_lasts or 10.0
-    return Models(q=config.q_manoeuvre, every=every, lasts=lasts)
+    return Models(q=config.q_manoeuvre, every=every, lasts=lasts, motions=2, heights=heights)
 
 
 def _biases(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[Component, float]]:
@@ -228,9 +251,9 @@ def _constants(sensor: Sensor, errors: SensorErrors, flat: bool) -> list[tuple[i
 
 
 def _before_all(
-    settings: Settings, sensors: Sequence[SensorTable], n: int, witnesses: int, spoken: int, models: bool
+    settings: Settings, sensors: Sequence[SensorTable], n: int, witnesses: int, spoken: int, parts: int
 ) -> Copies:
-    """Return one copy of a table without tracks of `n` states, which two models have too if wanted."""
+    """Return one copy of a table without tracks of `n` states, which `parts` components have too (0: none)."""
     k = settings.n_constant
     clutter = np.zeros((len(sensors), AZIMUTH_BINS + 1))
     for table in sensors:
@@ -258,8 +281,9 @@ def _before_all(
         undetected=np.full(1, settings.targets_at_start),
         seen_range=np.zeros(len(sensors)),
     )
-    if models:
-        tracks = tracks._replace(mode=np.zeros((0, 2)), mode_x=np.zeros((0, 2, n)), mode_P=np.zeros((0, 2, n, n)))
+    if parts:
+        mode_x, mode_P = np.zeros((0, parts, n)), np.zeros((0, parts, n, n))
+        tracks = tracks._replace(mode=np.zeros((0, parts)), mode_x=mode_x, mode_P=mode_P)
     one = no_copies(tracks)
     whole = {name: getattr(tracks, name)[None] for name in WHOLE}
     return one._replace(

@@ -33,7 +33,7 @@ def smoothed_rows(window: Window, plan: Plan, after: float, until: float, t_know
     shown = np.flatnonzero(now.life[: int(now.live[0]), 2] > 0.0)
     birth, x, P, t = now.birth[shown], now.x[shown], now.P[shown], float(now.time[0])
     hit = now.life[shown, 1]
-    mode: Any = None if now.mode is None else now.mode[shown]
+    mode: Any = None if plan.models is None or plan.models.motions == 1 else _motions(now.mode[shown])
     out: list[Rows] = []
     for tracks in reversed(copies):
         birth, here, there = np.intersect1d(
@@ -44,8 +44,8 @@ def smoothed_rows(window: Window, plan: Plan, after: float, until: float, t_know
         hit = hit[there]
         dt = t - float(tracks.time[0])
         q = np.full(len(birth), plan.settings.q)
-        if plan.models is not None:
-            q, mode = _modes_back(tracks.mode[here], plan.models, plan.settings, dt, mode[there])
+        if plan.models is not None and plan.models.motions == 2:
+            q, mode = _modes_back(_motions(tracks.mode[here]), plan.models, plan.settings, dt, mode[there])
         x, P = _back(tracks, here, plan.settings, dt, q, x[there], P[there])
         t -= dt
         if t <= until:
@@ -65,6 +65,12 @@ def _back(
     gain = np.linalg.solve(predicted, F @ P0).transpose(0, 2, 1)
     smoothed = P0 + gain @ (P - predicted) @ gain.transpose(0, 2, 1)
     return x0 + np.einsum("nij,nj->ni", gain, x - x0 @ F.T), 0.5 * (smoothed + smoothed.transpose(0, 2, 1))
+
+
+def _motions(mode: FloatArray) -> FloatArray:
+    """Return the probabilities (k, 2) of the two models of motion, whatever the height."""
+    out: FloatArray = mode.reshape(len(mode), -1, 2).sum(axis=1)
+    return out
 
 
 def _modes_back(

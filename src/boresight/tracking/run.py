@@ -39,7 +39,7 @@ def tracker_for(recording: Recording, config: TrackerConfig, sensors: Sequence[s
         for p in recording.platforms
     }
     use = None if sensors is None else tuple(sorted(recording.sensor_index(name) for name in sensors))
-    return Tracker(config, recording.sensors, recording.dimensions, poses, use)
+    return Tracker(config, recording.sensors, recording.dimensions, poses, use, recording.site.height)
 
 
 def believed(tracker: Tracker, state: TrackerState) -> tuple[float, FloatArray, FloatArray, FloatArray, FloatArray]:

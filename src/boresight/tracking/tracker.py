@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from boresight.frames.pose import PoseTrack, add_navigation_noise, sensor_poses
+from boresight.frames.pose import PoseTrack, add_navigation_noise, has_pose, sensor_poses
 from boresight.kernels.tracker_looks import NO_LOOK, Looks, moment, places_of_looks
 from boresight.kernels.tracker_rows import ARRIVAL, PENDING, RowTable, row_table, rows_at_arrival, times_due
 from boresight.tracking.config import TrackerConfig
@@ -62,6 +62,7 @@ class Tracker:
         dimensions: 2 (tracks in the plane up = 0) or 3.
         poses: the platforms' pose tracks by id; a look uses only the stamps up to its own time of arrival.
         use: indices of the sensors that are used, None for all (sets the window and the planned biases).
+        site_height: of the site above the ellipsoid (m), to which the sensors' prior heights refer.
     """
 
     config: TrackerConfig
@@ -69,13 +70,14 @@ class Tracker:
     dimensions: int
     poses: Mapping[str, PoseTrack] = field(default_factory=dict)
     use: tuple[int, ...] | None = None
+    site_height: float = 0.0
     plan: Plan = field(init=False)
     length: float = field(init=False)  # s, of the window for late looks
     _period: FloatArray = field(init=False)  # (S,) s, declared; NaN: to be found out; 0: not used
 
     def __post_init__(self) -> None:
         used = self.used
-        plan = make_plan(self.config, self.sensors, self.dimensions, used)
+        plan = make_plan(self.config, self.sensors, self.dimensions, used, self.site_height)
         object.__setattr__(self, "plan", plan)
         latencies = [self.sensors[i].latency for i in used] or [0.0]
         length = self.config.window
@@ -220,6 +222,9 @@ class Tracker:
         """Fill the poses of the looks `which` of one sensor and the noise of its navigation; `t` of all detections."""
         sensor = self.sensors[looks.sensor[which[0]]]
         track = self.poses.get(sensor.platform) if sensor.platform is not None else None
+        if sensor.platform is not None and not has_pose(sensor, track):  # none of its navigation has come
+            looks.t[which] = np.nan
+            return
         detections, poses, first = places_of_looks(looks, which)
         times = np.empty(len(poses))
         own = first[1:] + np.arange(len(which))  # the look itself stands behind its detections
