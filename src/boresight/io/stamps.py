@@ -555,8 +555,9 @@ def _wrong_arrivals(
             unit = next((w for w, f in UNITS.items() if abs(ratio / f - 1.0) < 1e-3), None)
             why = _why(middle)
             cause = unit or why or "another epoch or unit than t_s"
-            text = f"arrival lies {middle:.10g} s from t_s in the median: {cause}. Not used: rows arrive in the order"
-            _say(out, s, "t_recv_s", "arrival", len(rows), -middle, f"{text} of the file with the newest stamp so far")
+            text = f"arrival lies {middle:.10g} s from t_s in the median: {cause}. It is not used: rows arrive in"
+            text += " the order of the file, with the newest stamp so far"
+            _say(out, s, "t_recv_s", "arrival", len(rows), -middle, text)
             continue
         limit = max(LONGEST_DELAY, 20.0 * float(np.median(np.abs(delay[rows] - middle))))
         odd = rows[np.abs(delay[rows] - middle) > limit]
