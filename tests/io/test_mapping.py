@@ -12,6 +12,7 @@ from boresight.errors import UserError
 from boresight.io.columns import like_name, split_unit
 from boresight.io.declaration import read_declaration
 from boresight.io.mapping import guess_map, north_mark, read_map, read_raw, write_map
+from boresight.io.proposal import propose, turn_of
 from boresight.io.user_csv import Options, import_csv
 from boresight.types import Axes, Component, Recording, Reporting
 
@@ -292,3 +293,47 @@ def test_a_platform_far_from_the_site_is_a_mistake_unless_told(
             read(tmp_path, "radar", "nav", toml=SHIP, guess=True)
     notes = read(tmp_path, "radar", "nav", toml=SHIP, guess=True, far=True).notes
     assert any("from the site" in n for n in notes)
+
+
+@pytest.mark.parametrize("period", [0.5, 1.2, 2.5, 11.87])
+def test_the_turn_of_a_rotating_sensor_is_found(period: float) -> None:
+    rng = np.random.default_rng(3)
+    t = np.sort(rng.uniform(0.0, 60.0 * period, 400))
+    azimuth = (360.0 * (t + 0.3) / period + rng.normal(0.0, 1.0, len(t))) % 360.0
+    assert turn_of(t, azimuth) == pytest.approx(period, rel=1e-3)
+    assert turn_of(t, rng.uniform(0.0, 360.0, len(t))) is None
+
+
+def test_a_recording_toml_is_proposed_where_there_is_none(tmp_path: Path) -> None:
+    ship(tmp_path)
+    files = [tmp_path / f"{n}.csv" for n in ("radar", "eo", "nav")]
+    text, declared = propose(files)
+    (tmp_path / "p.toml").write_text(text)
+    again = read_declaration(tmp_path / "p.toml")
+    assert [(s.id, str(s.kind), s.platform) for s in again.sensors] == [
+        ("radar", "radar", "platform"),
+        ("eo", "optical", "platform"),
+    ]
+    assert again.sensors[0].period == pytest.approx(2.5)
+    assert math.degrees(declared.site.latitude) == pytest.approx(54.0)
+    recording = import_csv(files, tmp_path / "p.toml", options=Options(guess=True))[0]
+    assert len(recording.platforms) == 1
+    with pytest.raises(UserError, match="no file holds detections"):
+        propose([tmp_path / "nav.csv"])
+
+
+def test_messages_that_share_a_stamp_by_chance_are_no_look(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    t, who = np.sort(rng.integers(0, 60, 120)), rng.integers(0, 20, 120)
+    rows = "".join(
+        f"{a},{211000000 + w},{54.0 + 0.01 * w},8.0\n" for a, w in zip(t.tolist(), who.tolist(), strict=True)
+    )
+    write(tmp_path, ais="t_s,mmsi,lat,lon\n" + rows)
+    recording = read(tmp_path, "ais", guess=True)
+    assert len(np.unique(recording.detections.scan)) == 120
+    assert recording.sensors[1].reporting is Reporting.SINGLE
+    every = "".join(f"{a},{w},{54.0 + 0.01 * w},8.0\n" for a in range(10) for w in range(20))
+    write(tmp_path, ais="t_s,icao24,lat,lon\n" + every)
+    recording = read(tmp_path, "ais", guess=True)
+    assert len(np.unique(recording.detections.scan)) == 10
+    assert recording.sensors[1].reporting is Reporting.SCAN

@@ -117,9 +117,9 @@ def test_a_cut_recording_gives_the_same_rows(harbour: Recording, sensors: list[s
         part = Detections(d.t[keep], d.t_recv[keep], d.sensor[keep], d.scan[keep], d.z[keep], d.sigma[keep], {})
         navigation = harbour.platforms[0]
         known = navigation.t <= cut
+        columns = {f.name: getattr(navigation, f.name) for f in dataclasses.fields(navigation)}
         platform = dataclasses.replace(
-            navigation,
-            **{f.name: getattr(navigation, f.name)[known] for f in dataclasses.fields(navigation) if f.name != "id"},
+            navigation, **{name: column[known] for name, column in columns.items() if isinstance(column, np.ndarray)}
         )
         short = dataclasses.replace(
             harbour, detections=part, platforms=(platform,), duplicates=harbour.duplicates[keep]

@@ -47,7 +47,7 @@ def autoferry(
 @app.command
 def csv(
     *detections: Path,
-    sensors: Path,
+    sensors: Path | None = None,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     platform: Path | None = None,
     truth: Path | None = None,
@@ -73,7 +73,7 @@ def csv(
     detections
         One line per detection: t_s, sensor, scan, and what was measured (range_m, azimuth_deg, x_m …).
     sensors
-        A recording.toml that declares site and sensors.
+        A recording.toml that declares site and sensors; --guess alone proposes one.
     output
         Folder of the recording.
     platform
@@ -101,6 +101,7 @@ def csv(
     """
     from boresight.io.declaration import read_declaration
     from boresight.io.mapping import write_map
+    from boresight.io.proposal import propose
     from boresight.io.user_csv import Options, file_maps, import_csv, with_offsets
 
     ignored = [c.strip() for c in ignore_columns.split(",") if c.strip()] if ignore_columns else []
@@ -109,10 +110,17 @@ def csv(
         if not guess:
             raise UserError("import csv: give -o REC, the folder of the recording (or --guess alone to see a mapping)")
         notes: list[str] = []
-        maps = file_maps(detections, read_declaration(sensors), options, notes)
+        if sensors is None:
+            text, declared = propose(detections, time_unit)
+            print(text)
+        else:
+            declared = read_declaration(sensors)
+        maps = file_maps(detections, declared, options, notes)
         print_notes(notes)
         print(write_map(with_offsets(maps, options)), end="")
         return
+    if sensors is None:
+        raise UserError("import csv: give --sensors RECORDING.toml (boresight import csv --guess FILES proposes one)")
     check_output(output, force, RECORDING, [*detections, sensors, platform, truth, ignore, mapping])
     recording, read = import_csv(detections, sensors, platform, truth, ignore, options)
     extras = {"mapping.toml": write_map(with_offsets(read, options), output.absolute())} if guess or mapping else None

@@ -565,6 +565,10 @@ def _guess_scans(raw: Raw, of: FileMap, declared: Declaration) -> tuple[FileMap,
             return msgspec.structs.replace(
                 of, scan=NORTH
             ), f"it turns once in {period:g} s: its azimuths follow its stamps"
+    ids = [] if "source_id" not in table else (table.objects("source_id") or [])
+    known = len({name for name in ids if name is not None})
+    if known >= 2 and len(np.unique(t)) > 0 and len(t) / len(np.unique(t)) < 0.5 * known:
+        return msgspec.structs.replace(of, scan=EACH), f"messages of {known} source_id, few at one stamp"
     if len(steps) and (steps == 0.0).mean() > 0.1:
         return msgspec.structs.replace(of, scan=STAMP), "several rows have the same stamp"
     if period is not None and len(steps) and float(np.median(steps)) < 0.5 * period:

@@ -14,6 +14,7 @@ from boresight.io import paths
 from boresight.io.declaration import Declaration, read_declaration, write_declaration
 from boresight.io.files import RECORDING, output_folder
 from boresight.io.livelog import is_log
+from boresight.io.stamps import newest
 from boresight.io.table import Table, read_table, write_table
 from boresight.types import Axes, Detections, PlatformTrack, Recording, Sensor
 
@@ -111,7 +112,10 @@ def write_recording(
     with output_folder(path, force, RECORDING) as folder:
         declared = Declaration(recording.name, recording.dimensions, recording.site, recording.sensors)
         (folder / "recording.toml").write_text(write_declaration(declared), encoding="utf-8")
-        write_table(folder / "detections.parquet", det.columns_of(recording.detections, recording.sensors))
+        columns = det.columns_of(recording.detections, recording.sensors)
+        if np.array_equal(recording.detections.t_recv, newest(recording.detections.t, recording.usable)):
+            del columns["t_recv_s"]  # what a reader finds by itself is not written as if it had been recorded
+        write_table(folder / "detections.parquet", columns)
         if recording.platforms:
             write_table(folder / "platform.parquet", paths.platform_columns(recording.platforms))
         if recording.truth:

@@ -46,7 +46,7 @@ def _single(recording: Recording, i: int) -> str:
         return ""
     if len(np.unique(d.scan[rows])) < len(rows):
         return ""
-    rows = rows[np.argsort(d.t[rows], kind="stable")]
+    rows = rows[np.argsort(d.t_recv[rows], kind="stable")]
     ids = [] if d.source_id is None else [d.source_id[r] for r in rows.tolist()]
     known = {name for name in ids if name is not None}
     if len(known) >= 2:
@@ -70,7 +70,7 @@ def _jumps(z: FloatArray, sigma: FloatArray, t: FloatArray) -> float:
         point, sigma[:, Component.EAST], np.hypot(sigma[:, Component.RANGE], r * sigma[:, Component.AZIMUTH])
     )
     far = np.linalg.norm(np.diff(place, axis=0), axis=1)
-    limit = SPEED * np.diff(t) + 10.0 * np.nan_to_num(noise[1:], nan=0.0)
+    limit = SPEED * np.abs(np.diff(t)) + 10.0 * np.nan_to_num(noise[1:], nan=0.0)
     good = np.isfinite(far)
     return float((far[good] > limit[good]).mean()) if good.any() else 0.0
 

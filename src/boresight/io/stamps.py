@@ -315,7 +315,8 @@ def _units(
         if middle > LARGEST:
             mend = f"not used: {mend}"
             for row in rows.tolist():
-                out.refused[row] = f"its stamp t_s = {t[row]:.10g} {rule.split(' ', 1)[1].split(':')[0]}"
+                unit = "too large for seconds" if word is None else f"in {word}"
+                out.refused[row] = f"its stamp t_s = {t[row]:.10g} is {unit}"
                 good[row] = False
         _say(out, s, "t_s", "unit", len(rows), math.nan, f"{rule}; {mend}")
     return found
@@ -349,7 +350,7 @@ def _epochs(
         for i in np.unique(sensor[group]).tolist():
             mine = np.sort(group[sensor[group] == i])
             found.append(i)
-            offset = _epoch_offset(t, recv, sensor, main, mine, i, end_to_end)
+            offset = _exact(_epoch_offset(t, recv, sensor, main, mine, i, end_to_end))
             low, high = float(t[mine].min()), float(t[mine].max())
             cause = _why(offset) or ("since the device was switched on, or of the day" if abs(low) < 1e7 else "")
             cause = f" ({cause})" if cause else ""
@@ -412,13 +413,19 @@ def _epoch_offset(
 def _why(offset: float, within: float = 0.6) -> str:
     """The usual reason for two clocks to differ by so much (s), known to `within` s; an empty string for none."""
     size = abs(offset)
-    near = min(OFFSETS, key=lambda known: abs(size - known))
-    if abs(size - near) < (min(within, 3.0) if near < 100.0 else 25.0):
-        return OFFSETS[near]
+    for known, why in OFFSETS.items():
+        if abs(size - known) < (min(within, 3.0) if known < 100.0 else 25.0):
+            return why
     quarter = size / 900.0
     if size < 15.0 * 3600.0 and round(quarter) > 0 and abs(size - 900.0 * round(quarter)) < 3.0:
         return "a time zone"
     return ""
+
+
+def _exact(offset: float) -> float:
+    """An offset (s), made that of two known clocks where it is as near as steps between reports allow."""
+    known = next((k for k in OFFSETS if abs(abs(offset) - k) < (0.6 if k < 100.0 else 3.0)), abs(offset))
+    return math.copysign(known, offset)
 
 
 def _set_back(out: Stamps, t: FloatArray, rows: IntArray, jump: float, sensor: Sensor) -> None:
@@ -497,27 +504,27 @@ def _arrival(
         arrival = np.zeros(n)
         for i in range(len(sensors)):
             rows = np.flatnonzero(sensor == i)
-            arrival[rows] = _newest(t[rows], good[rows])
+            arrival[rows] = newest(t[rows], good[rows])
         return arrival
-    newest = _newest(t, good)
+    so_far = newest(t, good)
     if not given.any():
-        return newest
+        return so_far
     use = given & good
     if use.any():
         given &= ~_wrong_arrivals(out, t, recv, sensor, use, sensors, jump)
     arrival = np.where(given, recv, np.nan)
     if not given.any():
-        return newest
+        return so_far
     full = given[good].all()
     if full:  # the times of arrival order the reports, whatever the order of the file
         return np.where(given, arrival, np.interp(np.arange(n), np.flatnonzero(given), arrival[given]))
     # a row without one comes with the newest before it
     late = np.where(given, arrival, -np.inf)
     held = np.maximum.accumulate(late)
-    return np.maximum.accumulate(np.where(given, arrival, np.maximum(held, newest)))
+    return np.maximum.accumulate(np.where(given, arrival, np.maximum(held, so_far)))
 
 
-def _newest(t: FloatArray, good: NDArray[np.bool_]) -> FloatArray:
+def newest(t: FloatArray, good: NDArray[np.bool_]) -> FloatArray:
     """The running maximum of the good stamps; before the first of them, that."""
     if not good.any():
         return np.maximum.accumulate(t)
@@ -547,11 +554,10 @@ def _wrong_arrivals(
             ratio = float(np.median(recv[rows])) / max(abs(float(np.median(t[rows]))), 1e-9)
             unit = next((w for w, f in UNITS.items() if abs(ratio / f - 1.0) < 1e-3), None)
             why = _why(middle)
-            cause = f"{unit}?" if unit else (why or "another epoch or unit than t_s?")
-            text = (
-                f"arrival lies {middle:.10g} s from t_s in the median: {cause} It is not used: rows arrive in the order"
-            )
-            _say(out, s, "t_recv_s", "arrival", len(rows), -middle, f"{text} of the file with the newest stamp so far")
+            cause = unit or why or "another epoch or unit than t_s"
+            text = f"arrival lies {middle:.10g} s from t_s in the median: {cause}. It is not used: rows arrive in"
+            text += " the order of the file, with the newest stamp so far"
+            _say(out, s, "t_recv_s", "arrival", len(rows), -middle, text)
             continue
         limit = max(LONGEST_DELAY, 20.0 * float(np.median(np.abs(delay[rows] - middle))))
         odd = rows[np.abs(delay[rows] - middle) > limit]
@@ -580,11 +586,18 @@ def _wrong_arrivals(
                 f"{text}{t[row]:.10g} s; they arrive with their neighbours",
             )
             continue
+        why = _why(middle, 1.0)
         if middle < -max(1.0, 0.05 * jump[i]):
-            why = _why(middle)
+            wrong[(sensor == i) & np.isfinite(recv)] = True
             cause = why or "one of the two clocks is wrong"
-            text = f"reports arrive {-middle:.6g} s before they are valid (median): {cause}"
+            text = (
+                f"reports arrive {-middle:.6g} s before they are valid (median): {cause}. It is not used: rows arrive"
+            )
+            text += " in the order of the file, with the newest stamp so far"
             _say(out, s, "t_recv_s", "arrival_before", len(rows), -middle, text)
+        elif middle > 5.0 and why:
+            text = f"reports arrive {middle:.6g} s after they are valid (median): {why}? If so, subtract it"
+            _say(out, s, "t_recv_s", "arrival_after", len(rows), -middle, text)
     return wrong
 
 
@@ -659,7 +672,7 @@ def _shifted_spans(
             side = "later" if offset > 0 else "earlier"
             text = (
                 f"it begins and ends {abs(offset):.4g} s {side} than the other sensors: {_why(offset)}? If so, import "
-                f"with --time-offset {sensors[i].id}={-round(offset):.4g}"
+                f"with --time-offset {sensors[i].id}={-_exact(offset):.4g}"
             )
             _say(out, sensors[i], "t_s", "offset", int((sensor == i).sum()), -offset, text)
             return

@@ -190,7 +190,7 @@ def static_likelihood(tr: Tracks, i: int, s: Settings, fix: FloatArray, fix_R: F
 def moving_likelihood(
     tr: Tracks, i: int, s: Settings, sensor: SensorTable, look: Look, k: int, at: Places, room: Workroom
 ) -> float:
-    """Log-likelihood of a world position under the moving track, biases included: the anchor's rival.
+    """Log-likelihood of a detection's place under the moving track, biases included: the anchor's rival.
 
     What the track knows of the sensor's constant errors is taken off `room.fix`, for the anchor's sake too.
     """
@@ -214,14 +214,15 @@ def moving_likelihood(
                 for a in range(d):
                     G[a, j] = C[a, p]
                     fix[a] -= C[a, p] * x[j]
+    dt = look.dt[k]  # the place is that of the detection's own time
     for a in range(d):
-        y[a] = fix[a] - x[a]
+        y[a] = fix[a] - x[a] - dt * x[d + a]
         for j in range(2 * d, n - s.n_constant):  # the constant errors are off already
             y[a] -= G[a, j] * x[j]
         for b in range(a + 1):
-            acc = at.covariance[k, a, b] + P[a, b]
+            acc = at.covariance[k, a, b] + P[a, b] + dt * (P[a, d + b] + P[d + a, b] + dt * P[d + a, d + b])
             for j in range(2 * d, n):
-                acc += P[a, j] * G[b, j] + G[a, j] * P[j, b]
+                acc += (P[a, j] + dt * P[d + a, j]) * G[b, j] + G[a, j] * (P[j, b] + dt * P[j, d + b])
                 for m in range(2 * d, n):
                     acc += G[a, j] * P[j, m] * G[b, m]
             L[a, b] = acc

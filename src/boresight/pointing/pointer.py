@@ -23,6 +23,8 @@ from boresight.pointing.mount import Mask, horizon_at
 from boresight.types import Site
 from boresight.types.sensor import FloatArray
 
+NEAR = 20e3  # m: what is nearer is in sight, unless the mount's own horizon says otherwise
+
 
 class Mode(StrEnum):
     """What the beam follows."""
@@ -237,7 +239,8 @@ class Pointer:
             return False
         azimuth, elevation = aim.azimuth, aim.elevation
         if not self.horizon:  # what is nearer than the point where the line of sight meets the level stands before it
-            return elevation < 0.0 and aim.distance > (EQUATOR + self.site.height) * math.sin(-elevation)
+            meets = (EQUATOR + self.site.height) * math.sin(-elevation)
+            return elevation < 0.0 and aim.distance > max(meets, NEAR)
         if place is not None and not math.isnan(place.enu_from_mount[0, 0]):
             on_board = (float(v) for v in unit_of(azimuth, elevation) @ place.enu_from_mount)
             azimuth, elevation, _ = azel_from_enu(*on_board)

@@ -29,8 +29,6 @@ class Clock:
         off = self.wall() - (self.tied + now)
         if abs(off) < STEPPED:
             self.tied += max(min(off, SLEW * dt), -SLEW * dt)
-            self.told = 0.0
-            return ""
         if abs(off - self.told) < STEPPED:
             return ""
         step, self.told = off - self.told, off

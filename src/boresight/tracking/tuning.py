@@ -174,6 +174,29 @@ class _Likelihood:
         return total, seen
 
 
+def likelihoods(found: list[Thread], dimensions: int, noises: FloatArray, stretch: int) -> FloatArray:
+    """Return the log likelihood (s, k) of the innovations of each stretch of so many reports under k process noises.
+
+    The sensors' sigmas are those declared; the first reports of each track, whose innovations tell of the prior, are
+    left out.
+    """
+    filter_stream: Any = ekf_stream
+    columns = []
+    for noise in noises:
+        motion = NearlyConstantVelocity(float(noise), dimensions)
+        column: list[float] = []
+        for thread in found:
+            k, n = len(thread.reports.t), len(thread.x0)
+            out = [np.empty(s) for s in ((k, n), (k, n, n), (k, n), (k, n, n), (k, n, n))]
+            nis = np.zeros((k, 3))
+            head = (motion.kernel, motion.parameters, observe, thread.x0, thread.P0, float(thread.reports.t[0]))
+            done = filter_stream(*head, thread.reports.t, thread.reports.z, thread.reports.context, 1, *out, nis)
+            values = nis[SKIPPED:, 2] if done == k else np.full(k - SKIPPED, -1e6)
+            column += [float(values[i : i + stretch].sum()) for i in range(0, len(values), stretch)]
+        columns.append(column)
+    return np.array(columns).T
+
+
 def tune(found: list[Thread], dimensions: int, q: float, progress: Callable[[Step], None] = lambda step: None) -> Tuned:
     """Climb the likelihood from process noise `q` (m²/s³) and the declared sigmas; raises UserError without tracks."""
     if not found:
