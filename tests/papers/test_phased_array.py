@@ -57,3 +57,17 @@ def test_the_satellite_is_where_it_should_be() -> None:
         assert elevation[:-2].min() > 9.9
         np.testing.assert_allclose(np.diff(p.node), 1.0)
         assert separation(p.direction[0], p.direction[-1]) > 1.5
+
+
+def test_the_source_that_is_off_is_found_in_every_pass() -> None:
+    """The table's twelve passes with a source 10 km off: found in all of them, 0.012° RMSE, no pass above 0.03°."""
+    streams = np.random.default_rng([1, list(SCENARIOS).index("biased")]).spawn(12)
+    worst = 0.0
+    for rng in streams:
+        p = simulate(SCENARIOS["biased"], rng)
+        out = FILTER.run(reports_of(p), p.node, p.node + LEAD)
+        at = (out.position - p.array)[SKIPPED:]
+        truth = orbit(SCENARIOS["biased"].offset, p.node + LEAD)[0][SKIPPED:] - p.array[SKIPPED:]
+        worst = max(worst, float(np.degrees(np.sqrt(np.mean(separation(at, truth) ** 2)))))
+        assert (out.biased[SKIPPED:] == 1).all()
+    assert worst < 0.03

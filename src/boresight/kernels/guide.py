@@ -34,9 +34,9 @@ ROW_THEN, ROW_Y, ROW_LOOK, ROW_SECOND = 0, 1, 2, 3
 ROW_AXES, ROW_MOTION, ROW_A, ROW_BIAS, ROW_F = 4, 7, 10, 13, 19
 ROW_H, ROW_G, ROW_S, ROW_R, ROW_ROOM = 28, 34, 40, 46, 52
 ROWS, LEAST_WIDTH = 70, 12
-# Columns of row LOOK: where the report was made, what it says, its variances, and how far the prediction is (m). Of a
-# position or track: the value.
-LOOK_ORIGIN, LOOK_Z, LOOK_VARIANCE, LOOK_ACROSS, LOOK_FAR = 0, 3, 6, 9, 10
+# Columns of row LOOK: where the report was made, what it says, its variances, how far the prediction is (m), and if the
+# state begins with it. Of a position or track: the value.
+LOOK_ORIGIN, LOOK_Z, LOOK_VARIANCE, LOOK_ACROSS, LOOK_FAR, LOOK_FIRST = 0, 3, 6, 9, 10, 11
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})

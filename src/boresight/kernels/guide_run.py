@@ -12,7 +12,9 @@ from boresight.kernels.guide import (
     ACCELERATION,
     EARTH_RATE,
     LEAST_WIDTH,
+    LOOK_FIRST,
     ORBIT,
+    ROW_LOOK,
     ROWS,
     TRACK,
     advance,
@@ -72,6 +74,7 @@ def step(
     k = look_at(kind, t, z, origin, axes, sigma, scale[source], w)
     if k == 0:
         return EMPTY
+    w[ROW_LOOK, LOOK_FIRST] = 1.0 if clock[C_COUNT] == 1.0 else 0.0
     best, lag, sources = int(clock[C_BEST]), t - clock[C_TIME], len(sigma_bias)
     fate = REJECTED
     nis, share = 0.0, 0.0
@@ -125,6 +128,7 @@ def surprise(
     k = look_at(kind, t, z, origin, axes, sigma, scale[source], w)
     if k == 0:
         return math.nan
+    w[ROW_LOOK, LOOK_FIRST] = 0.0
     dynamics, q = int(settings[S_DYNAMICS]), settings[S_Q]
     best, sources = int(clock[C_BEST]), len(scale)
     n = _size(best, sources, settings)

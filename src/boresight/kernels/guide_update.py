@@ -14,6 +14,7 @@ from boresight.kernels.guide import (
     EARTH_RATE,
     LONGEST,
     LOOK_FAR,
+    LOOK_FIRST,
     LOOK_Z,
     N_BIAS,
     ORBIT,
@@ -145,7 +146,7 @@ def update(
         for i in range(k):
             a = w[ROW_S + i, i] - w[ROW_R + i, i]
             w[ROW_S + i, i] += w[ROW_SECOND, i] * a * a
-        if not math.isnan(w[ROW_LOOK, LOOK_Z + 2]):
+        if w[ROW_LOOK, LOOK_FIRST] == 0.0 and not math.isnan(w[ROW_LOOK, LOOK_Z + 2]):
             _curvature(P, k - 1, w)
     if at[BIAS_TIME] >= 0:
         _time_by_velocity(P, at[BIAS_TIME], k, w)
