@@ -21,11 +21,12 @@ import numpy as np
 
 from benchmarks.scoreboard import COMBINATIONS, DATA, configuration, recordings
 from boresight._version import __version__
+from boresight.engine.track import run
 from boresight.errors import UserError
 from boresight.io.scans import iter_scans
 from boresight.metrics.score import score
 from boresight.tracking.config import TrackerConfig
-from boresight.tracking.run import run, track_rows, tracker_for
+from boresight.tracking.run import track_rows, tracker_for
 from boresight.types import FloatArray, Recording
 
 MIDDLE_OF = 10  # candidates

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from boresight._version import __version__
+from boresight.engine.track import run
 from boresight.io.scans import iter_scans
 from boresight.models.motion import NearlyConstantVelocity
 from boresight.sim.actors import Drawn, Target
@@ -27,7 +28,7 @@ from boresight.sim.looks import SimulatedSensor
 from boresight.sim.scenario import Scenario, simulate
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.tracking.registration import Constant, constants_of
-from boresight.tracking.run import run, tracker_for
+from boresight.tracking.run import tracker_for
 from boresight.types import Coverage, Recording, Sensor, SensorKind, Site
 
 DEG = math.pi / 180.0

@@ -14,9 +14,10 @@ import numpy as np
 from benchmarks import assignment, batch, filters, recording, scoreboard, startup, whole_tracker
 from benchmarks.timing import Contenders, Row, row, rows_of, timed
 from boresight._version import __version__
+from boresight.engine.track import run
 from boresight.io.scans import iter_scans
 from boresight.study.engine import cores
-from boresight.tracking.run import run, tracker_for
+from boresight.tracking.run import tracker_for
 from boresight.tracking.tracker import Tracker
 from boresight.tracking.warm import warm_poses
 from boresight.types import Scan

@@ -22,13 +22,14 @@ import numpy as np
 
 from boresight._version import __version__
 from boresight.config.tracker import read_tracker_config
+from boresight.engine.track import run
 from boresight.errors import UserError
 from boresight.io.autoferry import TRACKER_TOML, import_autoferry
 from boresight.io.scans import iter_scans
 from boresight.metrics.score import Score, score
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.output import Rows
-from boresight.tracking.run import run, track_rows, tracker_for
+from boresight.tracking.run import track_rows, tracker_for
 from boresight.types import Recording
 
 MARKS = ("<!-- table -->", "<!-- end of table -->")

@@ -18,8 +18,9 @@ LEVELS = [
     {"screen", "align", "fuse", "sim", "bounds", "metrics", "io"},
     {"tracking", "register", "pointing"},
     {"stages"},
-    {"pipeline"},
+    {"engine"},
     {"config"},
+    {"door"},
     {"cli", "report", "papers", "service", "study"},
 ]
 LEVEL = {name: i for i, names in enumerate(LEVELS) for name in names}

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from boresight._version import __version__
 
 if TYPE_CHECKING:
+    from boresight.door import Track, Tracker, read_recording, sensor, track
     from boresight.filters.adaptive import AdaptiveNoise
     from boresight.filters.bearings import BearingsOnly
     from boresight.filters.ekf import predict, update
@@ -27,7 +28,10 @@ if TYPE_CHECKING:
         Singer,
     )
     from boresight.models.own import own_motion, own_sensor
-    from boresight.types import GaussianState, Pose, UpdateInfo
+    from boresight.pointing.guide import GuideFilter, GuideSource
+    from boresight.pointing.pointer import Pointer
+    from boresight.tracking.config import TrackerConfig
+    from boresight.types import GaussianState, Pose, Results, Sensor, Site, UpdateInfo
 
 # Where each public name lives: nothing heavy is imported before it is asked for.
 _HOME = {
@@ -36,6 +40,8 @@ _HOME = {
     "CoordinatedTurn": "boresight.models",
     "ExtendedKalman": "boresight.filters.extended",
     "GaussianState": "boresight.types",
+    "GuideFilter": "boresight.pointing.guide",
+    "GuideSource": "boresight.pointing.guide",
     "Infrared": "boresight.models",
     "InteractingModels": "boresight.filters.imm",
     "KnownTurn": "boresight.models",
@@ -44,16 +50,26 @@ _HOME = {
     "NearlyConstantAcceleration": "boresight.models",
     "NearlyConstantJerk": "boresight.models",
     "NearlyConstantVelocity": "boresight.models",
+    "Pointer": "boresight.pointing.pointer",
     "Pose": "boresight.types",
     "Position": "boresight.models",
     "Radar": "boresight.models",
+    "Results": "boresight.types",
+    "Sensor": "boresight.types",
     "SensorPose": "boresight.models",
     "Singer": "boresight.models",
+    "Site": "boresight.types",
+    "Track": "boresight.door",
+    "Tracker": "boresight.door",
+    "TrackerConfig": "boresight.tracking.config",
     "UnscentedKalman": "boresight.filters.ukf",
     "UpdateInfo": "boresight.types",
     "own_motion": "boresight.models.own",
     "own_sensor": "boresight.models.own",
     "predict": "boresight.filters.ekf",
+    "read_recording": "boresight.door",
+    "sensor": "boresight.door",
+    "track": "boresight.door",
     "update": "boresight.filters.ekf",
 }
 
@@ -63,6 +79,8 @@ __all__ = [
     "CoordinatedTurn",
     "ExtendedKalman",
     "GaussianState",
+    "GuideFilter",
+    "GuideSource",
     "Infrared",
     "InteractingModels",
     "KnownTurn",
@@ -71,17 +89,27 @@ __all__ = [
     "NearlyConstantAcceleration",
     "NearlyConstantJerk",
     "NearlyConstantVelocity",
+    "Pointer",
     "Pose",
     "Position",
     "Radar",
+    "Results",
+    "Sensor",
     "SensorPose",
     "Singer",
+    "Site",
+    "Track",
+    "Tracker",
+    "TrackerConfig",
     "UnscentedKalman",
     "UpdateInfo",
     "__version__",
     "own_motion",
     "own_sensor",
     "predict",
+    "read_recording",
+    "sensor",
+    "track",
     "update",
 ]
 

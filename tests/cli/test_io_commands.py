@@ -117,9 +117,10 @@ def test_force_never_destroys_an_input_or_other_files(run: Run, rec: Path, out: 
 
 
 def test_odd_files_are_refused_in_one_line(run: Run, rec: Path, tmp_path: Path) -> None:
-    (tmp_path / "semi.csv").write_text("t_s;sensor;scan;range_m\n1;radar;0;5\n")
+    (tmp_path / "semi.csv").write_text("t_s sensor scan range_m\n1 radar 0 5\n")
     refused(
-        run("import", "csv", tmp_path / "semi.csv", "--sensors", tmp_path / "s.toml", "-o", tmp_path / "x"), "commas"
+        run("import", "csv", tmp_path / "semi.csv", "--sensors", tmp_path / "s.toml", "-o", tmp_path / "x"),
+        "unknown column",
     )
     refused(run("import", "csv", rec, "--sensors", tmp_path / "s.toml", "-o", tmp_path / "x"), "cannot be read")
     refused(run("info", rec / "detections.parquet"), "not a recording folder")
@@ -135,3 +136,49 @@ def test_a_column_that_stands_twice_is_refused(run: Run, rec: Path) -> None:
     table = pq.read_table(rec / "detections.parquet")
     pq.write_table(table.append_column("t_s", table["t_s"]), rec / "detections.parquet")
     refused(run("info", rec), "'t_s' stands twice")
+
+
+def test_notes_go_to_standard_error_and_json_stays_alone(run: Run, tmp_path: Path) -> None:
+    rows = "".join(f"{1764547200 + k},radar,{k},900,20\n" for k in range(50))
+    detections, sensors = files(
+        tmp_path, "t_s,sensor,scan,range_m,azimuth_deg\n" + rows + "2147483647,radar,50,900,20\n"
+    )
+    ran = run("import", "csv", detections, "--sensors", sensors, "-o", tmp_path / "rec")
+    assert ran.code == 0
+    assert "line 52 is refused" in ran.err
+    assert "1 refused" in ran.out
+    ran = run("info", tmp_path / "rec", "--json")
+    data = json.loads(ran.out)
+    assert "row 50 is refused" in ran.err
+    assert (data["parameters"]["refused"], data["rows"][0]["refused"]) == (1, 1)
+    assert data["parameters"]["height_above"] == "WGS84 ellipsoid"
+    assert data["rows"][0]["measured"] == {"range_m": [900.0, 900.0], "azimuth_deg": [20.0, 20.0]}
+    assert data["parameters"]["duration_s"] == 49.0
+
+
+def test_import_takes_an_offset_of_time_and_a_geoid_height(run: Run, tmp_path: Path) -> None:
+    detections, sensors = files(tmp_path)
+    words = ("import", "csv", detections, "--sensors", sensors, "-o", tmp_path / "x", "--force")
+    assert run(*words, "--time-offset", "radar=100.5").code == 0
+    assert read_recording(tmp_path / "x").detections.t.tolist() == [101.5, 102.5, 103.5]
+    refused(run(*words, "--time-offset", "radar"), "give SENSOR=SECONDS")
+    sensors.write_text(sensors.read_text().replace('kind = "radar"', 'kind = "radar"\nplatform = "ship"'))
+    sensors.write_text(sensors.read_text().replace("dimensions = 2", "dimensions = 3"))
+    (tmp_path / "ship.csv").write_text("time,lat,lon,alt_msl_ft\n0,50,8,100\n9,50,8,100\n")
+    words = (*words[:2], detections, tmp_path / "ship.csv", *words[3:], "--guess")
+    refused(run(*words), "above mean sea level", "--geoid-height-m")
+    assert run(*words, "--geoid-height-m", "47.5").code == 0
+    assert read_recording(tmp_path / "x").platforms[0].position[:, 2].tolist() == pytest.approx([77.98, 77.98])
+
+
+def test_names_are_shown_as_they_are(run: Run, tmp_path: Path) -> None:
+    for name in ("[/north]", "cam[left]", "@@SCRIPT@@", "a\\u001b[31mb"):
+        detections, sensors = files(tmp_path, "t_s,sensor,scan,range_m,azimuth_deg\n1,cam,0,900,20\n")
+        toml = sensors.read_text().replace('id = "radar"', f'id = "{name}"')
+        sensors.write_text(f'name = "{name}"\n' + toml)
+        detections.write_text(detections.read_text().replace("cam", name.replace("\\u001b", "\x1b")))
+        assert run("import", "csv", detections, "--sensors", sensors, "-o", tmp_path / "n", "--force").code == 0
+        ran = run("info", tmp_path / "n")
+        assert ran.code == 0
+        assert name.replace("\\u001b", "\\x1b") in ran.out
+        assert "\x1b" not in ran.out

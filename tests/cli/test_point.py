@@ -50,7 +50,7 @@ elevation_deg = 30.0
 pole = "in_face"
 """
 COLUMNS = ["t_s", "t_aim_s", "az_deg", "el_deg", "face_az_deg", "face_el_deg", "az_rate_deg_s", "el_rate_deg_s"]
-COLUMNS += ["sigma_deg", "p_in_beam", "mode"]
+COLUMNS += ["sigma_deg", "p_in_beam", "mount_az_deg", "mount_el_deg", "mode"]
 
 
 @pytest.fixture
@@ -159,3 +159,67 @@ def test_an_antenna_on_a_rolling_ship(run: Run, tmp_path: Path) -> None:
     told = run("point", tmp_path / "bad.toml", "--replay", rec, "-o", tmp_path / "no")
     assert told.code == 2
     assert "did you mean 'ship'" in told.err
+
+
+CAMERA = """
+[[sensors]]
+id = "camera"
+kind = "infrared"
+period_s = 0.1
+sigma_azimuth_deg = 0.05
+{elevation}
+p_detection = 1.0
+clutter_per_scan = 0.0
+"""
+
+
+def azimuth_error(run: Run, tmp_path: Path, name: str, sensors: str) -> tuple[float, float]:
+    """Median error of azimuth and elevation (deg) of a target at about 40° of elevation."""
+    text = SCENARIO.replace("[-9000.0, 6000.0, 2500.0]", "[-3000.0, 2500.0, 4000.0]").replace("140.0", "60.0")
+    (tmp_path / f"{name}.toml").write_text(text + sensors, encoding="utf-8")
+    (tmp_path / "site.toml").write_text(SITE, encoding="utf-8")
+    rec, out = tmp_path / f"{name}_rec", tmp_path / f"{name}_out"
+    assert run("simulate", tmp_path / f"{name}.toml", "-o", rec, "--seed", 11).code == 0
+    done = run("point", tmp_path / "site.toml", "--replay", rec, "-o", out)
+    assert done.code == 0, done.err
+    d = {k: np.array(v) for k, v in pq.read_table(out / "pointing.parquet").to_pydict().items()}
+    truth = pq.read_table(rec / "truth.parquet").to_pydict()
+    p = np.stack([np.interp(d["t_aim_s"], truth["t_s"], truth[k]) for k in ("east_m", "north_m", "up_m")])
+    az, el = np.degrees(np.arctan2(p[0], p[1])), np.degrees(np.arctan2(p[2], np.hypot(p[0], p[1])))
+    late = (d["t_s"] > 10.0) & (d["t_aim_s"] < 60.0)
+    wrapped = (d["az_deg"] - az + 180.0) % 360.0 - 180.0
+    return float(np.median(np.abs(wrapped[late]))), float(np.median(np.abs(d["el_deg"] - el)[late]))
+
+
+def test_a_camera_that_measures_azimuth_alone_makes_the_beam_better(run: Run, tmp_path: Path) -> None:
+    """Radar 0.2° at 1 Hz, camera 0.05° at 10 Hz: without an elevation nothing is made up in its place."""
+    radar = azimuth_error(run, tmp_path, "radar", "")
+    azimuth_only = azimuth_error(run, tmp_path, "both", CAMERA.format(elevation=""))
+    both_angles = azimuth_error(run, tmp_path, "angles", CAMERA.format(elevation="sigma_elevation_deg = 0.05"))
+    assert azimuth_only[0] < 0.5 * radar[0]
+    assert azimuth_only[1] < 1.3 * radar[1]
+    assert both_angles[0] < 0.5 * radar[0]
+    assert both_angles[1] < 0.5 * radar[1]
+
+
+def test_range_of_one_sensor_and_angles_of_another(run: Run, tmp_path: Path) -> None:
+    """A camera of both angles and a ranger without any: together they begin and hold the target."""
+    angles = CAMERA.format(elevation="sigma_elevation_deg = 0.05")
+    ranger = SCENARIO[SCENARIO.index("[[sensors]]") :].replace(
+        "sigma_azimuth_deg = 0.2\nsigma_elevation_deg = 0.2\n", ""
+    )
+    text = SCENARIO[: SCENARIO.index("[[sensors]]")] + ranger.replace('"radar"', '"ranger"', 1) + angles
+    (tmp_path / "s.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "site.toml").write_text(SITE, encoding="utf-8")
+    done = run("simulate", tmp_path / "s.toml", "-o", tmp_path / "rec", "--seed", 4)
+    assert done.code == 0, done.err
+    done = run("point", tmp_path / "site.toml", "--replay", tmp_path / "rec", "-o", tmp_path / "out")
+    assert done.code == 0, done.err
+    d = {k: np.array(v) for k, v in pq.read_table(tmp_path / "out" / "pointing.parquet").to_pydict().items()}
+    assert d["t_s"][0] < 3.0
+    truth = pq.read_table(tmp_path / "rec" / "truth.parquet").to_pydict()
+    p = np.stack([np.interp(d["t_aim_s"], truth["t_s"], truth[k]) for k in ("east_m", "north_m", "up_m")])
+    late = (d["t_s"] > 15.0) & (d["t_aim_s"] < 60.0)
+    off = (d["az_deg"] - np.degrees(np.arctan2(p[0], p[1])) + 180.0) % 360.0 - 180.0
+    assert np.median(np.abs(off[late])) < 0.1
+    assert set(d["mode"][late]) == {"fused"}

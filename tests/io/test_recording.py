@@ -202,7 +202,7 @@ BAD_TABLES = [
     (col("platform", "east_m", 1, None), "platform.parquet: row 1: east_m is null"),
     (lambda c: c.pop("platform"), "sensor 'radar' rides on platform 'ferry', which has no navigation data"),
     (put("platform", "platform", ["fery", "fery"]), r"no navigation data \(did you mean 'fery'"),
-    (lambda c: c["platform"].pop("yaw_deg"), "rows without yaw_deg, which sensor 'lidar' needs"),
+    (lambda c: c["platform"].pop("yaw_deg"), "no row with yaw_deg, which sensor 'lidar' needs"),
     (lambda c: c["platform"].pop("east_m"), "platform.parquet: column 'east_m' is missing"),
     (lambda c: [c["platform"].pop("east_m"), c["platform"].pop("north_m")], "no position; give either latitude_deg"),
     (col("ignore", "radius_m", 0, 0.0), "ignore.parquet: row 0: radius_m is 0.0"),

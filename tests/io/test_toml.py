@@ -39,16 +39,17 @@ SIGMA = st.floats(1e-3, 1e4)
     low=st.floats(-180.0, 179.0),
 )
 def test_any_sensor_comes_back(name, kind, axes, sigma, angles, latency, low, tmp_path_factory) -> None:
+    rides = None if axes is Axes.SITE_ENU else "ship"
     values = np.array([np.nan if s is None else s for s in (*sigma[:4], sigma[4], sigma[4], sigma[4])])
     values[1:3] = np.radians(values[1:3])
     one = Sensor(
-        name, kind, "ship", axes, Mount(*np.radians(angles).tolist(), lever_arm=(1.0, -2.0, 0.5)), values, latency,
+        name, kind, rides, axes, Mount(*np.radians(angles).tolist(), lever_arm=(1.0, -2.0, 0.5)), values, latency,
         None, 0.5, 2.0, Coverage((1.0, math.inf), (math.radians(low), math.radians(low + 1.0)), (-0.5, 0.5)),
     )  # fmt: skip
     path = tmp_path_factory.mktemp("t") / "recording.toml"
     path.write_text(write_declaration(Declaration("x", 2, Site(0.5, -1.0, 3.0), (one,))), encoding="utf-8")
     (two,) = read_declaration(path).sensors
-    assert (two.id, two.kind, two.axes, two.platform, two.latency) == (name, kind, axes, "ship", latency)
+    assert (two.id, two.kind, two.axes, two.platform, two.latency) == (name, kind, axes, rides, latency)
     np.testing.assert_allclose(two.sigma, one.sigma, rtol=1e-12)
     np.testing.assert_allclose(
         [two.mount.yaw, two.mount.pitch, two.mount.roll, *two.coverage.azimuth],

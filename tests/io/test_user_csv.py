@@ -31,7 +31,7 @@ def files(folder: Path, text: str | bytes = GOOD) -> tuple[Path, Path]:
 
 
 def test_cells_become_rows(tmp_path: Path) -> None:
-    rec = import_csv(*files(tmp_path, "\ufeff" + GOOD + "\n"))
+    rec, _ = import_csv(*files(tmp_path, "\ufeff" + GOOD + "\n"))
     np.testing.assert_allclose(rec.detections.z[:, 0], [100.0, np.nan, 110.0])
     np.testing.assert_allclose(rec.detections.z[[0, 2], 1], np.radians([10.0, 10.0]))
 
@@ -40,7 +40,7 @@ def test_truth_and_platform_files(tmp_path: Path) -> None:
     detections, sensors = files(tmp_path)
     (tmp_path / "t.csv").write_text("t_s,target,east_m,north_m\n0,a,1,2\n1,a,2,3\n")
     (tmp_path / "p.csv").write_text("t_s,platform,east_m,north_m,yaw_deg\n0,ship,0,0,\n9,ship,0,9,\n")
-    rec = import_csv(detections, sensors, platform=tmp_path / "p.csv", truth=tmp_path / "t.csv")
+    rec, _ = import_csv(detections, sensors, platform=tmp_path / "p.csv", truth=tmp_path / "t.csv")
     assert rec.truth[0].position.tolist() == [[1.0, 2.0, 0.0], [2.0, 3.0, 0.0]]
     assert rec.platforms[0].id == "ship"
 

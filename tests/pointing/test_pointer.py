@@ -138,9 +138,9 @@ def test_the_orbit_is_keplers() -> None:
 
 def test_the_transition_is_the_flows_derivative() -> None:
     x = np.array([6.9e6, 1e5, 2e5, 100.0, 5e3, 5.5e3, 0.0, 0.0, 0.0])
-    w = np.zeros(guide.WORK)
+    w = np.zeros((guide.ROWS, guide.LEAST_WIDTH))
     guide.advance(x.copy(), guide.ORBIT, 2.0, w)
-    F = w[guide.F : guide.F + 6, :6]
+    F = w[guide.ROW_F : guide.ROW_F + 6, :6]
     for j in range(6):
         h = 10.0 if j < 3 else 0.1
         a, b = x[:6].copy(), x[:6].copy()
@@ -190,3 +190,51 @@ def test_no_report_however_wrong_ends_it() -> None:
     state, out = POINTER.tick(state, 90.0)
     assert out is not None
     assert separation(out.aim.direction, enu(90.5)) < 1.0 * DEG
+
+
+def mode_at(where: np.ndarray, horizon: tuple[tuple[float, float], ...] = (), own: bool = False) -> Mode:
+    """The mode for a still target at a place (ENU m), reported by gps, maybe seen by own tracking too."""
+    p = Pointer(FILTER, SITE, (False, False, True), lead=0.5, horizon=horizon)
+    state = p.init()
+    at = np.array(ecef_from_enu(*(float(v) for v in where), SITE))
+    for t in np.arange(0.0, 5.0, 0.5).tolist():
+        p.take(state, 1, t, at)
+        if own:
+            e, n, u = where
+            p.take(state, 2, t, np.array([np.arctan2(e, n), np.arctan2(u, np.hypot(e, n)), np.nan]), HERE, R)
+    out = p.tick(state, 5.0)[1]
+    assert out is not None
+    return out.mode
+
+
+def test_below_the_horizon_is_a_mode_of_its_own() -> None:
+    """The antenna is 400 m above the ellipsoid: the sea at 20 km (-1.2°) is before the horizon, at 200 km not."""
+
+    def sea(far: float) -> np.ndarray:
+        r = 6371e3
+        return np.array([0.0, r * np.sin(far / r), r * (np.cos(far / r) - 1.0) - 400.0])
+
+    assert mode_at(sea(20e3)) == Mode.FUSED
+    assert mode_at(sea(60e3)) == Mode.FUSED
+    assert mode_at(sea(200e3)) == Mode.BELOW_HORIZON
+    assert mode_at(np.array([0.0, 2e6, -1e4])) == Mode.BELOW_HORIZON  # a satellite 0.3° below
+    assert mode_at(np.array([0.0, 2e6, 1e4])) == Mode.FUSED
+    wall = ((0.0, 30 * DEG), (90 * DEG, 30 * DEG), (91 * DEG, 0.0), (359 * DEG, 0.0))
+    assert mode_at(np.array([0.0, 1e4, 5e3]), wall) == Mode.BELOW_HORIZON  # 26.6° in the north, behind 30° of wall
+    assert mode_at(np.array([0.0, 1e4, 6e3]), wall) == Mode.FUSED  # 31°
+    assert mode_at(np.array([-1e4, 0.0, 5e3]), wall) == Mode.FUSED  # in the west there is no wall
+    assert mode_at(np.array([0.0, 1e4, 5e3]), wall, own=True) == Mode.FUSED  # the antenna itself sees it
+
+
+def test_nobody_searches_below_the_horizon() -> None:
+    """A target last seen when it went below: its uncertainty outgrows the beam, and still the beam waits."""
+    p = Pointer(FILTER, SITE, (False, False, True), lead=0.5, horizon=((0.0, 45 * DEG),))
+    state = p.init()
+    feed(p, state, np.arange(0.0, 10.0, 0.5), "g", np.random.default_rng(39))
+    modes = set()
+    for t in np.arange(10.0, 80.0, 1.0):
+        state, out = p.tick(state, float(t))
+        assert out is not None
+        modes.add(out.mode)
+    assert modes == {Mode.BELOW_HORIZON}
+    assert out.aim.p_in_beam < 0.5

@@ -161,3 +161,10 @@ def test_detections_lie_where_the_targets_were(recording: Recording) -> None:
     line = np.stack([np.interp(rays.t, truth.t, truth.position[:, k]) for k in range(2)], axis=1) - rays.origin[:, :2]
     off = np.angle(np.exp(1j * (rays.azimuth - np.arctan2(line[:, 0], line[:, 1]))))
     assert (abs(off) < np.radians(1.5)).mean() > 0.3  # a third of the bearings are of this boat
+
+
+def test_a_name_that_looks_like_a_mark_of_the_page_is_a_name() -> None:
+    data = {"name": "@@SCRIPT@@ @@DATA@@", "summary": {}}
+    page = render(data)
+    assert "<title>@@SCRIPT@@ @@DATA@@" in page
+    assert page.count("function make(tag") == 1

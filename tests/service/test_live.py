@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import selectors
 import shutil
 import socket
 import subprocess
@@ -21,7 +22,8 @@ from boresight.errors import UserError
 from boresight.pointing.mount import Mount
 from boresight.service.live import run_live
 from boresight.service.rotctld import Rotator
-from boresight.service.sockets import Tcp, Udp
+from boresight.service.sockets import PER_READ, Tcp, Udp
+from boresight.service.source import Waiting
 
 SITE = """
 [site]
@@ -132,59 +134,66 @@ def test_reports_in_commands_out(tmp_path: Path) -> None:
 
 
 def test_a_flood_is_bounded_and_every_datagram_of_it_counted() -> None:
-    source = Udp("127.0.0.1:0", 100)
+    source = Udp("127.0.0.1:0")
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
-            for _ in range(20_000):  # far beyond what the system's buffer holds
-                s.sendto(b"x" * 200, source.socket.getsockname())
-        assert source.overflow() > 0 or sys.platform != "linux"
-        first = source.read()
-        assert len(first) == 100
-        taken = len(first)
+            for _ in range(60_000):  # far beyond what the system's buffer holds
+                s.sendto(b"a\nb\nc\n" + b"x" * 200, source.socket.getsockname())
+        assert source.dropped() > 0 or sys.platform != "linux"
+        taken = 0
         while batch := source.read():
-            assert len(batch) <= 100
+            assert len(batch) <= PER_READ
             taken += len(batch)
         if sys.platform == "linux":
-            assert taken + source.overflow() == 20_000
+            assert taken + source.dropped() == 60_000
+            assert source.lost() == {"overflow": 4 * source.dropped()}  # in lines
     finally:
         source.close()
 
 
-def test_lines_beyond_what_is_taken_at_once_are_counted() -> None:
-    source = Tcp("127.0.0.1:0", 5)
+def test_silent_senders_shut_nobody_out() -> None:
+    source = Tcp("127.0.0.1:0", most=32)
+    selector = selectors.DefaultSelector()
+    source.attach(selector)
+    where = source.server.getsockname()
     try:
-        with socket.create_connection(source.server.getsockname()) as s:
-            s.sendall(b"x\n" * 12)
-            taken, until = 0, time.time() + 5.0
-            while taken + source.overflow() < 12 and time.time() < until:
-                batch = source.read()
-                assert len(batch) <= 5
-                taken += len(batch)
-            assert taken + source.overflow() == 12
-            assert source.overflow() > 0
+        with contextlib.ExitStack() as silent:
+            for _ in range(32):
+                silent.enter_context(socket.create_connection(where))
+            for _ in range(32):
+                source.read([source.server])
+            with socket.create_connection(where) as speaks:
+                speaks.sendall(b"hello\nhalf")
+                got: list[bytes] = []
+                for _ in range(100):
+                    got += source.read([key.fileobj for key, _ in selector.select(0.1)])
+                    if got:
+                        break
+                assert got == [b"hello"]
+                assert len(source.peers) == 32
+                assert source.lost() == {"silent_senders_closed": 1}
+            for _ in range(100):
+                got += source.read([key.fileobj for key, _ in selector.select(0.1)])
+                if len(got) == 2:
+                    break
+            assert got == [b"hello", b"half"]  # the last line need not end
     finally:
         source.close()
+        selector.close()
 
 
-def test_the_loop_tells_of_an_overflow(tmp_path: Path) -> None:
-    port = free_port()
-    (tmp_path / "site.toml").write_text(SITE.format(port=port, out=free_port(), rotator=""), encoding="utf-8")
-    station = read_site(tmp_path / "site.toml")
-    lines = 2_000
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
-        flooded = []
-
-        def flood() -> bool:  # called once per pass, while the loop reads nothing
-            if not flooded:
-                for _ in range(lines):
-                    s.sendto(b"{broken\n" * 70, ("127.0.0.1", port))
-                flooded.append(True)
-            return False
-
-        counts = run_live(station, pointer_for(station), 1.5, None, stop=flood)
-    dropped = counts["overflow"] - 6 * (counts["malformed"] // 64)
-    assert counts["malformed"] % 64 == 0  # 64 of the 70 lines of a datagram are looked at, the others counted
-    assert dropped + counts["malformed"] // 64 == lines or sys.platform != "linux"
+def test_raw_data_beyond_the_limits_goes_the_oldest_first_and_is_counted_in_lines() -> None:
+    waiting = Waiting(most_lines=10, most_bytes=1000, most_wait=1.0)
+    for k in range(6):
+        waiting.add(0, 0.1 * k, b"%d\nx\n" % k)
+    gone = waiting.beyond(0.5)
+    assert [(t, n) for _, t, _, n in gone] == [(0.0, 2)]
+    assert waiting.lines == 10
+    gone = waiting.beyond(1.25)  # what has waited longer than a second is no use any more
+    assert [t for _, t, _, _ in gone] == [pytest.approx(0.1), pytest.approx(0.2)]
+    waiting.add(0, 1.25, b"y" * 2000)
+    assert len(waiting.beyond(1.25)) == 4
+    assert waiting.lines == waiting.size == 0
 
 
 def ask(port: int) -> tuple[float, float]:

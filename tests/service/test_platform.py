@@ -23,6 +23,7 @@ from boresight.service.feed import Feed, Stand
 from boresight.service.live import run_live
 from boresight.service.navigation import FRD_FROM_RFU, Navigation
 from boresight.types import Axes
+from tests.service.common import give, parse
 
 SITE = """
 platform = "ship"
@@ -93,12 +94,12 @@ def test_reports_from_a_rolling_deck_are_turned_by_its_attitude(tmp_path: Path) 
     p = pointer_for(station(tmp_path))
     nav = Navigation("ship", p, 0.5)
     feed = Feed(p, {"radar": Stand(Axes.BODY, lever_arm=(-20.0, 0.0, -10.0)), "gps": Stand(), "own": Stand()}, nav)
-    assert feed.parse(json.dumps(radar_line(1.0, 1.0)).encode(), 1.0) == []
+    assert parse(feed, json.dumps(radar_line(1.0, 1.0)).encode(), 1.0) == []
     assert feed.counts["no_navigation"] == 1
     for t in np.arange(0.0, 2.0, 0.05):
-        feed.parse(json.dumps(navigation_line(float(t), float(t))).encode(), 2.0)
+        parse(feed, json.dumps(navigation_line(float(t), float(t))).encode(), 2.0)
     assert feed.counts["navigation"] == 40
-    (report,) = feed.parse(json.dumps(radar_line(1.02, 1.02)).encode(), 2.0)
+    (report,) = parse(feed, json.dumps(radar_line(1.02, 1.02)).encode(), 2.0)
     c = math.cos(report.z[1])
     u = np.array([c * math.sin(report.z[0]), c * math.cos(report.z[0]), math.sin(report.z[1])])
     R = ecef_from_enu_rotation(p.site)
@@ -109,7 +110,7 @@ def test_reports_from_a_rolling_deck_are_turned_by_its_attitude(tmp_path: Path) 
     face = rfu(1.02) @ enu_from_face(math.radians(-60.0), math.radians(30.0))
     az, el, _ = angles_from_face(face.T @ (TARGET - ship(1.02)[0]), Pole.IN_FACE)
     line = {"source": "own", "t_s": 1.02, "face_az_deg": math.degrees(az), "face_el_deg": math.degrees(el)}
-    (own,) = feed.parse(json.dumps(line).encode(), 2.0)
+    (own,) = parse(feed, json.dumps(line).encode(), 2.0)
     c = math.cos(own.z[1])
     u = np.array([c * math.sin(own.z[0]), c * math.cos(own.z[0]), math.sin(own.z[1])])
     to = TARGET - ship(1.02)[0]
@@ -130,13 +131,13 @@ def test_navigation_that_is_wrong_late_or_unknown_is_counted(tmp_path: Path) -> 
         ({"platform": None}, "malformed"),
     ):
         before = feed.counts[name]
-        feed.parse(json.dumps({**good, **change}).encode(), 1.0)
+        parse(feed, json.dumps({**good, **change}).encode(), 1.0)
         assert feed.counts[name] == before + 1, (change, feed.counts)
     fixed = Feed(p, {"radar": Stand(), "gps": Stand(), "own": Stand()})
-    fixed.parse(json.dumps(good).encode(), 1.0)
+    parse(fixed, json.dumps(good).encode(), 1.0)
     assert fixed.counts["unknown_platform"] == 1
     for i in range(5000):
-        feed.parse(json.dumps({**good, "t_s": 2.0 + 1e-3 * i}).encode(), 5.0)
+        parse(feed, json.dumps({**good, "t_s": 2.0 + 1e-3 * i}).encode(), 5.0)
     assert len(feed.navigation.rows) <= 1000  # type: ignore[union-attr]
 
 
@@ -147,11 +148,11 @@ def test_attitude_is_coasted_then_said_to_be_lost(tmp_path: Path) -> None:
     state, out = p.tick(state, 0.0, nav.place(0.0))
     assert out is None
     for t in np.arange(0.0, 5.0, 0.05):
-        feed.parse(json.dumps(navigation_line(float(t), float(t))).encode(), float(t))
+        parse(feed, json.dumps(navigation_line(float(t), float(t))).encode(), float(t))
     e, n, u = TARGET.tolist()
     line = {"source": "gps", "t_s": 4.9, "east_m": e, "north_m": n, "up_m": u}
-    for report in feed.parse(json.dumps(line).encode(), 5.0):
-        assert p.take(state, *report) == 0
+    for report in parse(feed, json.dumps(line).encode(), 5.0):
+        assert give(p, state, report) == 0
     for t, mode in ((5.0, Mode.FUSED), (5.4, Mode.FUSED), (5.6, Mode.NO_ATTITUDE), (7.0, Mode.NO_ATTITUDE)):
         state, out = p.tick(state, t, nav.place(t))
         assert out is not None
@@ -165,7 +166,7 @@ def test_attitude_is_coasted_then_said_to_be_lost(tmp_path: Path) -> None:
             x, y, z = rfu(out.t_aim).T @ (TARGET - ship(out.t_aim)[0])
             assert abs(math.degrees(out.mount_azimuth - math.atan2(x, y))) < 0.7
             assert abs(math.degrees(out.mount_elevation - math.atan2(z, math.hypot(x, y)))) < 0.7
-    feed.parse(json.dumps(navigation_line(7.0, 7.0)).encode(), 7.0)
+    parse(feed, json.dumps(navigation_line(7.0, 7.0)).encode(), 7.0)
     state, out = p.tick(state, 7.05, nav.place(7.05))
     assert out is not None
     assert out.mode != Mode.NO_ATTITUDE

@@ -13,8 +13,9 @@ import pytest
 
 from boresight.config.site import pointer_for, read_site
 from boresight.errors import UserError
+from boresight.io.jsonlines import LONGEST
 from boresight.service.live import run_live
-from boresight.service.sockets import BUFFER, Serial
+from boresight.service.sockets import Serial
 
 pty = pytest.importorskip("pty", reason="no pseudo-terminals here")
 pytest.importorskip("serial", reason="pyserial is not installed")
@@ -69,7 +70,7 @@ def wait_for(what, seconds: float = 10.0) -> bool:  # type: ignore[no-untyped-de
 def test_lines_come_whole_and_a_port_is_found_again(tmp_path: Path) -> None:
     plug = Plug(tmp_path / "tty")
     plug.plug()
-    port = Serial(str(plug.path), 9600, 10)
+    port = Serial(str(plug.path), 9600)
     lines: list[bytes] = []
 
     def arrived(n: int) -> bool:
@@ -85,7 +86,7 @@ def test_lines_come_whole_and_a_port_is_found_again(tmp_path: Path) -> None:
         wait_for(lambda: bool(port.read()) or bool(port.rest))
         plug.unplug()
         assert wait_for(lambda: not port.read() and port.device is None)
-        assert port.overflow() == 1  # the line without an end
+        assert port.lost() == {"overflow": 1}  # the line without an end
         plug.plug()
         assert wait_for(lambda: not port.read() and port.device is not None)
         plug.write(b"again\n")
@@ -99,13 +100,13 @@ def test_lines_come_whole_and_a_port_is_found_again(tmp_path: Path) -> None:
 def test_a_port_that_never_ends_its_line_is_bounded(tmp_path: Path) -> None:
     plug = Plug(tmp_path / "tty")
     plug.plug()
-    port = Serial(str(plug.path), 9600, 10)
+    port = Serial(str(plug.path), 9600)
     try:
-        for _ in range(3 * BUFFER // 1024):
+        for _ in range(3 * LONGEST // 1024):
             plug.write(b"x" * 1024)
             assert port.read() == []
-            assert len(port.rest) < BUFFER
-        assert wait_for(lambda: port.read() == [] and port.overflow() >= 2)
+            assert len(port.rest) <= LONGEST
+        assert wait_for(lambda: port.read() == [] and port.lost().get("overflow", 0) >= 2)
     finally:
         port.close()
         plug.unplug()
@@ -113,7 +114,7 @@ def test_a_port_that_never_ends_its_line_is_bounded(tmp_path: Path) -> None:
 
 def test_a_port_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="cannot be opened"):
-        Serial(str(tmp_path / "none"), 9600, 10)
+        Serial(str(tmp_path / "none"), 9600)
 
 
 def test_the_loop_points_by_a_serial_source_through_an_unplugging(tmp_path: Path) -> None:

@@ -9,10 +9,9 @@ import pytest
 
 from boresight.cli.track import track_recording
 from boresight.config.pipeline import take_pipeline
+from boresight.engine.track import run
 from boresight.io.scans import iter_scans
 from boresight.metrics.score import score
-from boresight.pipeline import Pipeline
-from boresight.pipeline import run as run_pipeline
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.run import track_rows, tracker_for
 from boresight.types import FATES, Detections, Fate, Recording, TrackRows
@@ -93,7 +92,6 @@ def test_rows_stay_close_in_time_while_looks_are_held(harbour: Recording) -> Non
 def test_without_stages_nothing_changes(harbour: Recording) -> None:
     plain = track_recording(harbour, TrackerConfig())
     tracker = tracker_for(harbour, TrackerConfig())
-    _, rows, _, notes = run_pipeline(Pipeline(), tracker, iter_scans(harbour))
+    _, rows, _ = run(tracker, iter_scans(harbour))
     same(plain.tracks, track_rows(rows))
-    assert not notes
     assert "value_row" not in plain.decisions.extra

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from benchmarks.scoreboard import DATA, SCENARIOS, configuration, recordings
 
+from boresight.engine.track import run
 from boresight.io.scans import iter_scans
 from boresight.metrics.score import Score, score
-from boresight.tracking.run import run, track_rows, tracker_for
+from boresight.tracking.run import track_rows, tracker_for
 from boresight.types import Recording
 
 pytestmark = pytest.mark.skipif(

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, multivariate_normal
 
+from boresight.engine.track import run
 from boresight.io.scans import iter_scans
 from boresight.kernels.tracker import AZIMUTH_BINS, HIDDEN, NOTHING, VISIBLE
 from boresight.kernels.tracker_state import innovation
 from boresight.kernels.tracker_workroom import workroom
 from boresight.tracking.config import TrackerConfig
-from boresight.tracking.run import decision_rows, run, tracker_for
+from boresight.tracking.run import decision_rows, tracker_for
 from boresight.tracking.tracker import Tracker, TrackerState
 from boresight.types import FATES, NO_TRACK, Coverage, Fate, FloatArray, Recording, Scan, SensorKind
 from tests.tracking.conftest import whole

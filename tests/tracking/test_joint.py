@@ -10,6 +10,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from boresight.association import jpda
+from boresight.engine.track import run
 from boresight.io.scans import iter_scans
 from boresight.kernels.tracker import Look
 from boresight.kernels.tracker_joint import mix, shares, take_shares
@@ -19,7 +20,7 @@ from boresight.kernels.tracker_workroom import workroom
 from boresight.metrics.score import score
 from boresight.tracking.config import SensorErrors, TrackerConfig
 from boresight.tracking.core import Plan, make_plan
-from boresight.tracking.run import run, track_rows, tracker_for
+from boresight.tracking.run import track_rows, tracker_for
 from boresight.tracking.window import empty_window
 from boresight.types import (
     Axes,

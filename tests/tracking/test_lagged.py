@@ -7,11 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
+from boresight.engine.track import run
 from boresight.io.scans import iter_scans
 from boresight.metrics.score import score
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.output import Rows
-from boresight.tracking.run import run, track_rows, tracker_for
+from boresight.tracking.run import track_rows, tracker_for
 from boresight.tracking.saved import arrays_of_state, state_of_arrays
 from boresight.tracking.tracker import Output, TrackerState
 from boresight.types import Axes, Coverage, Detections, Recording, Sensor, SensorKind, Site, TrackRows

@@ -11,13 +11,14 @@ from filterpy.kalman import IMMEstimator, KalmanFilter
 from scipy.linalg import expm
 
 from boresight.config.tracker import read_tracker_config
+from boresight.engine.track import run
 from boresight.errors import UserError
 from boresight.filters.imm import InteractingModels
 from boresight.io.scans import iter_scans
 from boresight.kernels.tracker import Tracks
 from boresight.models import NearlyConstantVelocity, Radar
 from boresight.tracking.config import SensorErrors, TrackerConfig
-from boresight.tracking.run import run, track_rows, tracker_for
+from boresight.tracking.run import track_rows, tracker_for
 from boresight.tracking.saved import arrays_of_state, state_of_arrays
 from boresight.tracking.tracker import Tracker
 from boresight.types import Recording, Scan, Sensor, SensorKind

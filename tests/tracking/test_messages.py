@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from boresight.engine.track import run
 from boresight.kernels.tracker import ADDRESS, INTERVAL, NOTHING, VISIBLE
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.output import Rows
-from boresight.tracking.run import run
 from boresight.tracking.tracker import Tracker
 from boresight.types import Coverage, FloatArray, Reporting, Scan, Sensor, address_code
 from tests.tracking.test_rules import points, sensor

@@ -9,6 +9,7 @@ import pytest
 from benchmarks.registration import CONFIG, SPREAD, case, estimate
 
 from boresight.config.tracker import parameters_of
+from boresight.engine.track import run
 from boresight.io.results import read_results, write_results
 from boresight.io.scans import iter_scans
 from boresight.kernels.measurement import measure
@@ -16,7 +17,7 @@ from boresight.kernels.registration import AZIMUTH, ELEVATION, RANGE, SCALE, TIM
 from boresight.metrics.score import score
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.registration import NOT, OBSERVABLE, Diary
-from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
+from boresight.tracking.run import decision_rows, track_rows, tracker_for
 from boresight.types import Results
 
 

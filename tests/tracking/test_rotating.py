@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from boresight.config.scenario import read_scenario
+from boresight.engine.track import run
 from boresight.io.scans import iter_scans
 from boresight.kernels.tracker import STATIC
 from boresight.sim.scenario import simulate
 from boresight.tracking.config import TrackerConfig
-from boresight.tracking.run import decision_rows, run, tracker_for
+from boresight.tracking.run import decision_rows, tracker_for
 from boresight.tracking.tracker import Tracker
 from boresight.types import FATES, Fate, Scan, Sensor, SensorKind
 

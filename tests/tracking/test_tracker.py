@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from boresight.engine.track import run
 from boresight.errors import UserError
 from boresight.io.scans import iter_scans
 from boresight.metrics.score import score
 from boresight.tracking.config import SensorErrors, TrackerConfig
-from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
+from boresight.tracking.run import decision_rows, track_rows, tracker_for
 from boresight.tracking.saved import arrays_of_state, snapshot, state_of_arrays
 from boresight.types import FATES, Detections, Fate, Recording, Sensor, SensorKind, Site, TrackRows
 from tests.tracking.conftest import make_recording
@@ -116,9 +117,9 @@ def test_a_cut_recording_gives_the_same_rows(harbour: Recording, sensors: list[s
         part = Detections(d.t[keep], d.t_recv[keep], d.sensor[keep], d.scan[keep], d.z[keep], d.sigma[keep], {})
         navigation = harbour.platforms[0]
         known = navigation.t <= cut
+        columns = {f.name: getattr(navigation, f.name) for f in dataclasses.fields(navigation)}
         platform = dataclasses.replace(
-            navigation,
-            **{f.name: getattr(navigation, f.name)[known] for f in dataclasses.fields(navigation) if f.name != "id"},
+            navigation, **{name: column[known] for name, column in columns.items() if isinstance(column, np.ndarray)}
         )
         short = dataclasses.replace(
             harbour, detections=part, platforms=(platform,), duplicates=harbour.duplicates[keep]
@@ -194,7 +195,8 @@ RESUME = """
 import io, sys
 import numpy as np
 from boresight.io.scans import iter_scans
-from boresight.tracking.run import run, track_rows, tracker_for
+from boresight.engine.track import run
+from boresight.tracking.run import track_rows, tracker_for
 from boresight.tracking.saved import state_of_arrays
 from tests.tracking.conftest import make_recording
 from tests.tracking.test_tracker import CONFIG

@@ -7,11 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
+from boresight.engine.track import run
 from boresight.io.scans import iter_scans
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.names import MAX_ROW_GAP, Names
 from boresight.tracking.output import Rows
-from boresight.tracking.run import NAVIGATION_AHEAD, decision_rows, run, track_rows, tracker_for
+from boresight.tracking.run import NAVIGATION_AHEAD, decision_rows, track_rows, tracker_for
 from boresight.tracking.tracker import Output, Tracker, TrackerState
 from boresight.types import FATES, Coverage, DecisionRows, Fate, Recording, Scan, Sensor, SensorKind
 from tests.tracking.test_tracker import CONFIG, same

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 
@@ -37,6 +38,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "info": ("boresight.cli.info:info", "Say what is in a recording."),
     "export": ("boresight.cli.export:export", "Write tracks as CSV, GeoJSON or KML."),
     "convert": ("boresight.cli.convert:convert", "Turn pixels, az/el, ENU, NED, ECEF and geodetic into each other."),
+    "serve": ("boresight.cli.serve:serve", "Track live reports, log them, send the tracks on; follow one."),
+    "send": ("boresight.cli.send:send", "Send a recording as live JSON lines, at its own speed or faster."),
     "point": ("boresight.cli.point:point", "Point an antenna or beam at what the sources report."),
     "passes": ("boresight.cli.passes:passes", "List satellite passes, and whether the mount can follow."),
     "paper": ("boresight.cli.paper:app", "Print a paper's table: as printed, corrected, and ours."),
@@ -50,6 +53,7 @@ def main() -> None:
     """Run the command line; exit 0 done, 2 bad usage or input (one line on standard error), 1 our fault."""
     try:
         app(sys.argv[1:], exit_on_error=False, print_error=False)
+        sys.stdout.flush()
     except UserError as error:
         _usage(str(error))
     except CycloptsError as error:
@@ -57,6 +61,11 @@ def main() -> None:
     except BrokenPipeError:  # the reader of our output has gone (`| head`)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
+    except OSError as error:  # files are written by io.files, which says which; what is left is standard output
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO) or error.filename is not None:
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _usage(f"standard output cannot be written ({(error.strerror or str(error)).lower()})")
     except KeyboardInterrupt:
         sys.exit(130)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,10 +13,19 @@ from boresight._version import __version__
 from boresight.io.results import finite
 
 
-def print_json(command: str, parameters: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> None:
-    """Print the one object that `--json` promises on standard output."""
+def print_json(
+    command: str, parameters: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], notes: Sequence[str] | None = None
+) -> None:
+    """Print the one object that `--json` promises on standard output; `notes` tells what rows cannot."""
     data = {"command": command, "version": __version__, "parameters": parameters, "rows": rows}
+    data |= {} if notes is None else {"notes": notes}
     print(json.dumps(finite(data), indent=1, ensure_ascii=False, allow_nan=False))
+
+
+def print_notes(notes: Iterable[str]) -> None:
+    """Print on standard error what the user is to know of the input, a line each."""
+    for note in notes:
+        print(f"boresight: {plain(' '.join(note.split()))}", file=sys.stderr)
 
 
 def print_table(
@@ -29,13 +38,14 @@ def print_table(
     from rich import box
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     table = Table(box=box.SIMPLE_HEAD, title=title or None, title_justify="left", padding=(0, 1, 0, 0), pad_edge=False)
     for key, heading in columns.items():
         number = any(isinstance(row.get(key), int | float | np.number) for row in rows)
         table.add_column(heading, justify="right" if number else "left", overflow="fold")
     for row in rows:
-        table.add_row(*(cell(row.get(key), digits) for key in columns))
+        table.add_row(*(Text(cell(row.get(key), digits)) for key in columns))  # a name in brackets is no markup
     console = Console(file=sys.stdout, highlight=False)
     console.print(table)
 
@@ -50,4 +60,9 @@ def cell(value: Any, digits: int = 4) -> str:
     if isinstance(value, float):
         text = f"{value:.{digits}g}"
         return f"{value:.0f}" if "e" in text and 1e-3 < abs(value) < 1e15 else text
-    return str(value)
+    return plain(str(value))
+
+
+def plain(text: str) -> str:
+    """Return a text whose control characters are shown, not obeyed, by a terminal."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

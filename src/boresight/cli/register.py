@@ -178,7 +178,7 @@ def _told(recording: Recording, settings: TrackerConfig, used: list[int], base: 
         one = recording.sensors[i]
         if one.id in sensors:
             continue
-        camera = one.kind in (SensorKind.INFRARED, SensorKind.OPTICAL)
+        camera = not one.ranging
         told = SLOW if camera else SensorErrors()
         if i != base:
             told = dataclasses.replace(

@@ -6,11 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from boresight.cli.output import print_json, print_table
+from boresight.cli.output import print_json, print_notes, print_table
 from boresight.errors import UserError
 from boresight.io.recording import read_recording
 from boresight.io.results import read_results
-from boresight.metrics.score import CUT_OFF, score
+from boresight.metrics.losses import loss_lines, losses
+from boresight.metrics.score import ALPHA, ORDER, score
 from boresight.types import Recording, Results
 
 SETS = {
@@ -52,7 +53,15 @@ SENSORS = {
 }
 
 
-def score_command(out: Path, rec: Path, /, *, smoothed: bool = False, json: bool = False) -> None:
+def score_command(
+    out: Path,
+    rec: Path,
+    /,
+    *,
+    cut_off_m: float | None = None,
+    smoothed: bool = False,
+    json: bool = False,
+) -> None:
     """Score tracks against the truth of their recording: GOSPA, OSPA, tracked fraction, identities, NEES, NIS.
 
     Parameters
@@ -61,6 +70,9 @@ def score_command(out: Path, rec: Path, /, *, smoothed: bool = False, json: bool
         Folder of the results (boresight track -o).
     rec
         Folder of the recording, with truth.
+    cut_off_m
+        Largest distance at which a track holds a target, and the cut-off of GOSPA and OSPA (five standard deviations of
+        the best sensor's positions or of the truth, rounded up, at least 20 m).
     smoothed
         Score smoothed.parquet (boresight track --lag) instead of the causal tracks.
     json
@@ -72,24 +84,50 @@ def score_command(out: Path, rec: Path, /, *, smoothed: bool = False, json: bool
         if results.smoothed is None:
             raise UserError(f"{out}: no smoothed.parquet; write it with: boresight track {rec} -o {out} --lag 5")
         results = replace(results, tracks=results.smoothed)
-    rows = score_rows(recording, results)
+    check_belongs(results, recording, out, rec)
+    print_notes(recording.notes)
+    scored = score(recording, results.tracks, results.decisions, results.summary.get("sensors"), cut_off_m)
+    rows = [*scored.rows, *losses(recording, results.decisions)]
+    print_notes(scored.notes)
     if json:
         parameters = {
             "results": str(out),
             "recording": str(rec),
             "smoothed": smoothed,
-            "cut_off_m": CUT_OFF,
-            "p": 2,
-            "alpha": 2,
+            "cut_off_m": scored.cut_off,
+            "cut_off_from": "noise" if cut_off_m is None else "command line",
+            "p": ORDER,
+            "alpha": ALPHA,
             "clock_step_s": 0.5,
         }
         print_json("score", parameters, rows)
         return
     sets = [r for r in rows if r["item"] in ("tracks", "empty tracker")]
-    print_table(SETS, sets, title=f"GOSPA and OSPA with p = 2, alpha = 2, c = {CUT_OFF:g} m, every 0.5 s")
+    why = "from the noise of sensors and truth; --cut-off-m sets it" if cut_off_m is None else "as given"
+    print(f"cut-off {scored.cut_off:g} m ({why})")
+    print_table(SETS, sets, title=f"GOSPA and OSPA with p = 2, alpha = 2, c = {scored.cut_off:g} m, every 0.5 s")
     print_table(LIVES, sets)
     print_table(TARGETS, [r for r in rows if r["item"] == "target"])
     print_table(SENSORS, [r for r in rows if r["item"] == "sensor"])
+    for line in loss_lines(recording, results.decisions):
+        print(line)
+
+
+def check_belongs(results: Results, recording: Recording, out: Path, rec: Path) -> None:
+    """Raise UserError when results were not made from a recording: another number of reports or dimensions."""
+    made, has = len(results.decisions), len(recording.detections)
+    about = results.summary.get("recording")
+    about = about if isinstance(about, dict) else {}
+    of = f" (of '{about['name']}')" if isinstance(about.get("name"), str) else ""
+    if made != has:
+        raise UserError(
+            f"{out}: its results{of} are of {made} reports, {rec} has {has}: score with the recording tracked"
+        )
+    if about.get("dimensions", recording.dimensions) != recording.dimensions:
+        raise UserError(
+            f"{out}: its results{of} are {about['dimensions']}-D, {rec} is {recording.dimensions}-D: score with the "
+            "recording that was tracked"
+        )
 
 
 def score_rows(recording: Recording, results: Results) -> list[dict[str, Any]]:

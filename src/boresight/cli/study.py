@@ -118,7 +118,7 @@ def _warm(checked: Any) -> None:
 
 def _finish(checked: Any, folder: Path, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Write the results of all runs; returns the cells."""
-    from boresight.cli.track import versions
+    from boresight.door import versions
     from boresight.io.results import finite
     from boresight.study.plot import plot
     from boresight.study.table import cells, ordered, write_rows

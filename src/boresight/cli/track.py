@@ -6,7 +6,6 @@ import contextlib
 import shlex
 import sys
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -14,20 +13,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from boresight._version import __version__
-from boresight.cli.output import print_json
-from boresight.config.tracker import parameters_of, read_configuration
+from boresight.cli.output import print_json, print_notes
+from boresight.config.tracker import read_configuration
 from boresight.errors import UserError
 from boresight.io.files import check_output, output_folder
 from boresight.io.recording import read_recording
 from boresight.io.results import write_results
-from boresight.io.scans import iter_scans, selected
+from boresight.io.scans import selected
+from boresight.metrics.losses import loss_lines
 from boresight.tracking.config import TrackerConfig
-from boresight.types import FATES, DecisionRows, Recording, Results, Scan
+from boresight.types import Recording, Results, Scan
 
 if TYPE_CHECKING:
-    from boresight.tracking.output import Rows
-    from boresight.tracking.tracker import Output, TrackerState
+    pass
 
 LONGEST_LAG = 600.0  # s
 TRACKER_KERNEL = "kernels.tracker_window.advance"  # by far the longest to compile
@@ -69,10 +67,19 @@ def track(
     """
     check_output(output, force, inputs=[rec, config])
     recording = read_recording(rec)
+    print_notes(recording.notes)
     ids = sensor_ids(recording, sensors)
     source = config if config is not None else (rec / BESIDE if (rec / BESIDE).is_file() else None)
     known = [s.id for s in recording.sensors]
-    settings, stages = (TrackerConfig(), {}) if source is None else read_configuration(source, known)
+    chosen: list[str] = []
+    if source is None:
+        with loading():
+            from boresight.engine.defaults import defaults_for
+
+            settings, chosen = defaults_for(recording, ids)
+        stages: dict[str, Any] = {}
+    else:
+        settings, stages = read_configuration(source, known)
     if lag is not None:
         if not 0.0 <= lag <= LONGEST_LAG:
             raise UserError(f"--lag: {lag} s; give 0 to {LONGEST_LAG:g} s")
@@ -85,12 +92,14 @@ def track(
     results.summary["command"] = shlex.join(command)
     results.summary["recording_folder"] = str(rec)
     results.summary["config_file"] = None if source is None else str(source)
+    results.summary["settings_from_the_recording"] = chosen
     with output_folder(output, force) as folder:
         write_results(results, recording, folder)
-        if report:
-            from boresight.report.html import write_report
+    if report:  # once the results are safe
+        from boresight.report.html import write_report
 
-            write_report(folder / "report.html", results, recording)
+        write_report(output / "report.html", results, recording)
+    print_notes(loss_lines(recording, results.decisions))
     counts = results.summary["counts"]
     row = {"output": str(output), **counts, "seconds": results.summary["seconds"]}
     if json:
@@ -100,6 +109,8 @@ def track(
             f"wrote {output}: {counts['tracks']} tracks, {counts['rows']} rows, from {counts['reports']} reports "
             f"in {results.summary['seconds']:.2f} s"
         )
+        for line in chosen:
+            print(line)
         for c in results.summary.get("registration", []):
             print(f"{c['sensor']}: {c['parameter']} {c['value']:.3g} ± {c['sigma']:.2g} (1σ): {c['verdict']}")
 
@@ -120,90 +131,19 @@ def track_recording(
     stages: Mapping[str, Any] | None = None,
     where: str = "",
 ) -> Results:
-    """Track a recording in memory, with a progress bar on standard error where that is a terminal.
+    """Track a recording in memory as `boresight.track` does, with a progress bar where standard error is a terminal.
 
     `stages` is the pipeline before the tracker, as `config.pipeline.take_pipeline` gives it (none); `where` its file.
     """
     with loading():
-        from boresight import pipeline as stages_
-        from boresight.config.stages import make_pipeline
-        from boresight.tracking.registration import Diary
-        from boresight.tracking.run import decision_rows, track_rows, tracker_for
-        from boresight.tracking.warm import warm_poses, warm_tracker
+        from boresight.door import prepare
 
-        tracker = tracker_for(recording, config, sensors)
-        before = make_pipeline(stages or {}, recording, tracker.poses, tracker.used, where)  # mistakes before compiling
-        scans = list(iter_scans(recording, sensors))
-        warm_poses(tracker, scans)
-        warm_tracker(tracker)
-    started = time.perf_counter()
-    with _progress(len(scans)) as tick:
-        smoothed: list[Rows] = []
-        diary = Diary(tracker)
-
-        def watch(state: TrackerState, out: Output) -> None:
-            smoothed.extend(out.smoothed)
-            if tracker.plan.settings.n_constant:
-                diary.note(state)
-
-        looked_at = config.smoothing_lag is not None or tracker.plan.settings.n_constant > 0
-        state, rows, decisions, notes = stages_.run(
-            before, tracker, scans, progress=tick, watch=watch if looked_at else None
-        )
-    seconds = time.perf_counter() - started
-    tracks = track_rows(rows)
-    fates = decision_rows(recording, tracker, decisions, state.names)
-    if before.stages:
-        fates = stages_.with_notes(fates, notes)
-    summary: dict[str, Any] = {
-        "version": __version__,
-        "sensors": [recording.sensors[i].id for i in tracker.used],
-        "counts": {
-            "reports": len(recording.detections),
-            "scans": len(scans),
-            "tracks": state.names.given,
-            "rows": len(tracks),
-            "fates": _fates(fates),
-        },
-        "seconds": seconds,
-        "t_first_s": float(recording.detections.t.min()),
-        "t_last_s": float(recording.detections.t.max()),
-        "window_s": tracker.length,
-        "parameters": parameters_of(config) | ({"pipeline": pipeline_of(stages)} if stages else {}),
-        "versions": versions(),
-    }
-    past = track_rows(smoothed) if config.smoothing_lag is not None else None
-    if not tracker.plan.settings.n_constant:
-        return Results(tracks, fates, summary, past)
-    diary.note(state, last=True)
-    summary["registration"] = [c._asdict() for c in diary.known[-1]]
-    return Results(tracks, fates, summary, past, diary.rows())
-
-
-def pipeline_of(stages: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the pipeline as a summary shows it: kinds and options, and whether values share reports."""
-    return {**stages, "values_correlated": "smooth" in stages}
-
-
-def _fates(rows: DecisionRows) -> dict[str, int]:
-    counted = Counter(rows.fate.tolist())
-    return {str(FATES[code]): n for code, n in sorted(counted.items())}
-
-
-def versions() -> dict[str, str]:
-    """Return the versions of Python and of what the numbers depend on."""
-    import numba
-    import numpy
-    import scipy
-
-    python = ".".join(str(v) for v in sys.version_info[:3])
-    return {
-        "boresight": __version__,
-        "python": python,
-        "numpy": numpy.__version__,
-        "scipy": scipy.__version__,
-        "numba": numba.__version__,
-    }
+        prepared = prepare(recording, config, sensors, stages, where)
+    with _progress(len(prepared.scans)) as tick:
+        results = prepared.run(tick)
+    for words in results.summary.get("warnings", []):
+        print(f"boresight: {words}", file=sys.stderr)
+    return results
 
 
 @contextlib.contextmanager

@@ -19,7 +19,7 @@ from boresight.sim.actors import Attitude, Drawn, Navigation, Platform, Target
 from boresight.sim.looks import SimulatedSensor
 from boresight.sim.paths import Straight, Waypoints
 from boresight.sim.scenario import Scenario
-from boresight.types import FloatArray
+from boresight.types import FloatArray, Site
 
 Vector = tuple[float, float, float]
 Interval = tuple[float, float]
@@ -151,6 +151,7 @@ def scenario_of(data: dict[str, Any], where: str, seed: int | None = None) -> tu
     if chosen < 0:
         raise UserError(f"{where}: seed = {chosen}; give zero or more")
     targets = [_named(where, "target", t, i, table.dimensions) for i, t in enumerate(table.targets)]
+    site = site_of(table.site, where)
     rng = np.random.default_rng([chosen, 1])  # groups draw from a stream of their own
     for group in table.groups:
         targets += _group(group, table.dimensions, rng, f"{where}: groups['{group.id}']")
@@ -159,9 +160,9 @@ def scenario_of(data: dict[str, Any], where: str, seed: int | None = None) -> tu
             name=table.name,
             duration=table.duration_s,
             dimensions=table.dimensions,
-            site=site_of(table.site, where),
+            site=site,
             targets=tuple(targets),
-            sensors=tuple(_sensor(s, where) for s in table.sensors),
+            sensors=tuple(_sensor(s, where, site, table.dimensions) for s in table.sensors),
             platforms=tuple(_platform(p, where) for p in table.platforms),
             epoch=table.epoch_s,
             step=table.step_s,
@@ -244,7 +245,7 @@ def _group(group: GroupTable, dimensions: int, rng: np.random.Generator, at: str
     return out
 
 
-def _sensor(table: SimulatedSensorTable, where: str) -> SimulatedSensor:
+def _sensor(table: SimulatedSensorTable, where: str, site: Site, dimensions: int) -> SimulatedSensor:
     at = f"{where}: sensors['{table.id}']"
     if (table.rate_hz is None) == (table.period_s is None):
         raise UserError(f"{at}: give either rate_hz or period_s")
@@ -252,7 +253,7 @@ def _sensor(table: SimulatedSensorTable, where: str) -> SimulatedSensor:
         if not 0 < table.rate_hz < math.inf:
             raise UserError(f"{at}: rate_hz = {table.rate_hz}; give a rate above zero")
         table = msgspec.structs.replace(table, period_s=1.0 / table.rate_hz)
-    declared = sensor_of(table, where)
+    declared = sensor_of(table, where, site, dimensions)
     assert declared.period is not None
     bias = (table.bias_range_m, table.bias_azimuth_deg * DEG, table.bias_elevation_deg * DEG, table.bias_range_rate_m_s)
     return SimulatedSensor(

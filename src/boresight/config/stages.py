@@ -7,9 +7,9 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from boresight.engine.pipeline import Pipeline
 from boresight.errors import UserError, did_you_mean
 from boresight.frames.pose import PoseTrack
-from boresight.pipeline import Pipeline
 from boresight.screen.hampel import HampelScreen
 from boresight.screen.plausible import PlausibilityScreen
 from boresight.screen.prediction import PredictionScreen

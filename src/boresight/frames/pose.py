@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +18,7 @@ from boresight.types import Axes, Component, PlatformTrack, Pose, Sensor, Site
 from boresight.types.sensor import FloatArray
 
 FORETOLD = 2.8  # noise of a pose one stamp ahead against that of a stamp: √7.75, a quadratic over four stamps
+ALWAYS = -1e12  # s: the stamp of a platform at rest, before all others
 SLOPE_WINDOW = 1.0  # s to either side over which a missing velocity is fitted
 _NORTH_LEVEL: FloatArray = ENU_FROM_NED.copy()  # heading north, level: FRD is NED
 
@@ -29,28 +31,32 @@ class PoseTrack:
         id: the platform.
         t: (n,) stamps of positions (s); `position`, `velocity` (n, 3) in the site's ENU (m, m/s).
         measured: (n,) whether the velocity was given (else it is a slope); `hermite` (n - 1,) whether both ends were.
+        arrived: (n,) when each had arrived (s), ascending; `arrived_attitude` (m,) the same of attitudes.
         t_attitude: (m,) stamps of attitudes (s), empty if there are none; `quaternion` (m, 4) of enu_from_body;
             `steps` (m - 1, 3) the turn from each to the next (rad, body axes).
         max_extrapolation: how far before the first and after the last stamp an answer is given (s).
         max_gap: the longest time between stamps over which an answer is given (s).
-        sigma_position, sigma_attitude: declared errors of one stamp (m per axis, rad per angle); 0 if none are.
+        sigma_position, sigma_attitude: (n,) and (m,) declared error of each stamp (m per axis, rad per angle); where a
+            stamp has none, that of the one before; 0 before the first.
         site: set if local level turns with the platform's place on the ellipsoid; None for a flat world.
     """
 
     id: str
     t: FloatArray
+    arrived: FloatArray
     position: FloatArray
     velocity: FloatArray
     measured: NDArray[np.bool_]
     hermite: NDArray[np.bool_]
     t_attitude: FloatArray
+    arrived_attitude: FloatArray
     quaternion: FloatArray
     steps: FloatArray
     max_extrapolation: float
     max_gap: float
     site: Site | None
-    sigma_position: float = 0.0
-    sigma_attitude: float = 0.0
+    sigma_position: FloatArray
+    sigma_attitude: FloatArray
 
     @property
     def has_attitude(self) -> bool:
@@ -88,22 +94,25 @@ class PoseTrack:
         return Pose(times, position, velocity, R)
 
     def until(self, t: float) -> PoseTrack:
-        """Return what was known of the platform at time `t` (s): the stamps up to it, and slopes from these alone."""
-        n = int(np.searchsorted(self.t, t, side="right"))
-        m = int(np.searchsorted(self.t_attitude, t, side="right"))
+        """Return what was known at time `t` (s): the stamps that had arrived by then, and slopes from these alone."""
+        n = int(np.searchsorted(self.arrived, t, side="right"))
+        m = int(np.searchsorted(self.arrived_attitude, t, side="right"))
         if n == len(self.t) and m == len(self.t_attitude):
             return self
         velocity = self.velocity[:n]
-        recent = int(np.searchsorted(self.t, t - SLOPE_WINDOW))
+        newest = self.t[n - 1] if n else t
+        recent = int(np.searchsorted(self.t, newest - SLOPE_WINDOW))
         if not self.measured[recent:n].all():
-            first = int(np.searchsorted(self.t, t - 3.0 * SLOPE_WINDOW))
+            first = max(min(int(np.searchsorted(self.t, newest - 3.0 * SLOPE_WINDOW)), recent - 1), 0)
             slopes = kernel.slopes(self.t[first:n], self.position[first:n], SLOPE_WINDOW, recent - first)
             velocity = velocity.copy()
             velocity[recent:] = np.where(self.measured[recent:n, None], velocity[recent:], slopes)
         return replace(
-            self, t=self.t[:n], position=self.position[:n], velocity=velocity, measured=self.measured[:n],
-            hermite=self.hermite[: max(n - 1, 0)], t_attitude=self.t_attitude[:m], quaternion=self.quaternion[:m],
-            steps=self.steps[: max(m - 1, 0)],
+            self, t=self.t[:n], arrived=self.arrived[:n], position=self.position[:n], velocity=velocity,
+            measured=self.measured[:n], hermite=self.hermite[: max(n - 1, 0)], t_attitude=self.t_attitude[:m],
+            arrived_attitude=self.arrived_attitude[:m], quaternion=self.quaternion[:m],
+            steps=self.steps[: max(m - 1, 0)], sigma_position=self.sigma_position[:n],
+            sigma_attitude=self.sigma_attitude[:m],
         )  # fmt: skip
 
     def body_rate(self, t: ArrayLike) -> FloatArray:
@@ -150,9 +159,13 @@ def pose_track(
 
     Where velocities are missing they are the slope of a least-squares line over the stamps within ±1 s (at least
     the neighbours). With `site`, attitude and north-aligned axes refer to local level *at the platform*, which turns
-    by 0.009° per kilometre from the site's; without, the world is flat. Raises UserError for an empty track, stamps
-    that do not ascend, or a platform with no finite position.
+    by 0.009° per kilometre from the site's; without, the world is flat. One at rest is where its row says at all times.
+    Raises UserError for an empty track, stamps that do not ascend, or a platform with no finite position.
     """
+    if platform.at_rest:
+        always = np.full(len(platform.t), ALWAYS)
+        platform = replace(platform, t=always, t_recv=None, at_rest=False, velocity=np.zeros((len(always), 3)))
+        max_extrapolation = math.inf
     have = np.isfinite(platform.position).all(axis=1) & np.isfinite(platform.t)
     if not have.any():
         raise UserError(f"platform '{platform.id}': no row has a position")
@@ -169,11 +182,13 @@ def pose_track(
         velocity[~measured] = kernel.slopes(t, position, SLOPE_WINDOW, 0)[~measured]
     turned = np.isfinite(platform.ypr).all(axis=1) & np.isfinite(platform.t)
     t_attitude = np.ascontiguousarray(platform.t[turned])
-    quaternion = _attitudes(platform.ypr[turned], t_attitude, t, position, velocity, site)
+    quaternion = _attitudes(platform.ypr[turned], t_attitude, t, position, site)
+    arrived = platform.t if platform.t_recv is None else np.maximum.accumulate(platform.t_recv)
     return PoseTrack(
-        platform.id, t, position, velocity, measured, measured[1:] & measured[:-1], t_attitude, quaternion,
+        platform.id, t, np.ascontiguousarray(arrived[have]), position, velocity, measured,
+        measured[1:] & measured[:-1], t_attitude, np.ascontiguousarray(arrived[turned]), quaternion,
         rotations.steps_between(quaternion), max_extrapolation, max_gap, site,
-        _typical(platform.sigma_position), _typical(platform.sigma_attitude),
+        _carried_on(platform.sigma_position)[have], _carried_on(platform.sigma_attitude)[turned],
     )  # fmt: skip
 
 
@@ -184,10 +199,10 @@ def sensor_pose(sensor: Sensor, track: PoseTrack | None, t: ArrayLike) -> tuple[
     them: for `site_enu` and `platform_enu` east, north, up; for `body` and `mount` right, forward and minus down.
     The lever arm (FRD) turns with the platform and adds rate × arm to the velocity.
 
-    - `site_enu`: fixed at the site's origin; no lever arm.
+    - `site_enu`: fixed at the site's origin, or at its station with that place's east/north/up; no lever arm.
     - `platform_enu`: at the platform, north-aligned.
-    - `body`, `mount`: on the platform's body, turned by `mount` for the latter. Without a platform the body is the
-      site's north/east/down.
+    - `body`, `mount`: on the platform's body, turned by `mount` for the latter. Without a platform the body is north/
+      east/down of the site or station.
 
     Raises UserError for a platform sensor without a track, for one that needs attitude where there is none, and for
     times that the track does not cover.
@@ -195,7 +210,8 @@ def sensor_pose(sensor: Sensor, track: PoseTrack | None, t: ArrayLike) -> tuple[
     times = np.ascontiguousarray(np.atleast_1d(np.asarray(t, dtype=np.float64)))
     n = len(times)
     if sensor.axes == Axes.SITE_ENU:
-        return np.zeros((n, 3)), np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)).copy()
+        position, turn = _station(sensor, n)
+        return position, np.zeros((n, 3)), np.broadcast_to(turn, (n, 3, 3)).copy()
     if track is None:
         position, velocity, R, rate = _fixed(sensor, n)
     else:
@@ -219,15 +235,33 @@ def sensor_poses(
         return np.ones(len(known), np.bool_), *sensor_pose(sensor, track, t)
     limits = (track.max_gap, track.max_extrapolation)
     good, position, velocity = known_positions(
-        track.t, track.position, track.velocity, track.measured, track.hermite, limits, SLOPE_WINDOW, t, first, known
-    )
+        track.t, track.arrived, track.position, track.velocity, track.measured, track.hermite, limits, SLOPE_WINDOW,
+        t, first, known,
+    )  # fmt: skip
     needed = _needs_attitude(sensor, track)
     if not needed and not track.has_attitude:
         return good, position, velocity, _north_aligned(track, position)
-    turned, R, rate = known_attitudes(track.t_attitude, track.quaternion, track.steps, limits, t, first, known)
+    turned, R, rate = known_attitudes(
+        track.t_attitude, track.arrived_attitude, track.quaternion, track.steps, limits, t, first, known
+    )
     if not needed:  # before the first attitude stamp it does without
-        return good & (turned | (known < track.t_attitude[0])), position, velocity, _north_aligned(track, position)
+        return (
+            good & (turned | (known < track.arrived_attitude[0])),
+            position,
+            velocity,
+            _north_aligned(track, position),
+        )
     return good & turned, *_mounted(sensor, track, position, velocity, R, rate)
+
+
+def has_pose(sensor: Sensor, track: PoseTrack | None) -> bool:
+    """Return whether a sensor on a platform can have a pose at all from what is known of that."""
+    if sensor.axes == Axes.SITE_ENU:
+        return True
+    if track is None or not len(track.t):
+        return False
+    turned = sensor.axes != Axes.PLATFORM_ENU or any(sensor.mount.lever_arm)
+    return track.has_attitude or not turned
 
 
 def _needs_attitude(sensor: Sensor, track: PoseTrack) -> bool:
@@ -275,15 +309,19 @@ def add_navigation_noise(
     stamp up to `known` (s, also for each row) carries the noise of its extrapolation. Without declared errors the
     covariance comes back as it is.
     """
-    turns = sensor.axes not in (Axes.SITE_ENU, Axes.PLATFORM_ENU)
-    a = track.sigma_attitude if turns else 0.0
-    p = track.sigma_position if sensor.axes != Axes.SITE_ENU else 0.0
-    if not len(t) or (a == 0.0 and p == 0.0):
+    turns = track.has_attitude and sensor.axes not in (Axes.SITE_ENU, Axes.PLATFORM_ENU)
+    moves = len(track.t) > 0 and sensor.axes != Axes.SITE_ENU
+    if not len(t) or not ((turns and track.sigma_attitude.any()) or (moves and track.sigma_position.any())):
         return covariance
-    ahead = np.zeros(len(t), np.bool_)
-    if track.has_attitude:
-        newest = np.searchsorted(track.t_attitude, np.broadcast_to(known, t.shape), side="right") - 1
-        ahead = t > track.t_attitude[np.maximum(newest, 0)]
+    by = np.broadcast_to(known, t.shape)
+    a, p, ahead = np.zeros(len(t)), np.zeros(len(t)), np.zeros(len(t), np.bool_)
+    if moves:
+        p = track.sigma_position[np.maximum(np.searchsorted(track.arrived, by, side="right") - 1, 0)]
+    if turns:
+        newest = np.maximum(np.searchsorted(track.arrived_attitude, by, side="right") - 1, 0)
+        a = track.sigma_attitude[newest]
+        if track.max_extrapolation < math.inf:  # else it is at rest, and never foretold
+            ahead = t > track.t_attitude[newest]
     angle2 = (a * np.where(ahead, FORETOLD, 1.0)) ** 2
     far = np.where(np.isnan(z[:, Component.RANGE]), np.inf, z[:, Component.RANGE])
     across = angle2 + (p / np.maximum(far, 1.0)) ** 2
@@ -298,9 +336,11 @@ def add_navigation_noise(
     return out
 
 
-def _typical(sigma: FloatArray) -> float:
-    known = sigma[np.isfinite(sigma)]
-    return float(np.median(known)) if len(known) else 0.0
+def _carried_on(sigma: FloatArray) -> FloatArray:
+    """Return (n,) each value, where it is NaN the last one before it, 0 before the first."""
+    known = np.isfinite(sigma)
+    last = np.maximum.accumulate(np.where(known, np.arange(len(sigma)), -1))
+    return np.where(last >= 0, sigma[np.maximum(last, 0)], 0.0)
 
 
 def _fixed(sensor: Sensor, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -309,7 +349,15 @@ def _fixed(sensor: Sensor, n: int) -> tuple[FloatArray, FloatArray, FloatArray, 
         raise UserError(
             f"sensor '{sensor.id}' has axes = \"{sensor.axes}\" but there is no track of its platform{name}"
         )
-    return np.zeros((n, 3)), np.zeros((n, 3)), np.broadcast_to(_NORTH_LEVEL, (n, 3, 3)).copy(), np.zeros((n, 3))
+    position, turn = _station(sensor, n)
+    return position, np.zeros((n, 3)), np.broadcast_to(turn @ _NORTH_LEVEL, (n, 3, 3)).copy(), np.zeros((n, 3))
+
+
+def _station(sensor: Sensor, n: int) -> tuple[FloatArray, FloatArray]:
+    """Where a fixed sensor stands (n, 3), and how its local level is turned (3, 3)."""
+    if sensor.station is None:
+        return np.zeros((n, 3)), np.eye(3)
+    return np.tile(np.array(sensor.station.position), (n, 1)), np.array(sensor.station.enu_from_local)
 
 
 def _body_from_mount(sensor: Sensor) -> FloatArray:
@@ -328,16 +376,18 @@ def _north_aligned(track: PoseTrack, position: FloatArray) -> FloatArray:
     return R
 
 
-def _attitudes(
-    ypr: FloatArray, t_attitude: FloatArray, t: FloatArray, p: FloatArray, v: FloatArray, site: Any
-) -> FloatArray:
+def _attitudes(ypr: FloatArray, t_attitude: FloatArray, t: FloatArray, p: FloatArray, site: Any) -> FloatArray:
+    """Return the attitudes (m, 4) against world ENU; local level is that of the place known at each stamp."""
     if not len(t_attitude):
         return np.zeros((0, 4))
     yaw, pitch, roll = (np.ascontiguousarray(ypr[:, i]) for i in range(3))
     R = ENU_FROM_NED @ rotations.matrix_from_ypr(yaw, pitch, roll)
     if site is not None:
-        where, _ = kernel.interpolate_position(t, p, v, np.zeros(max(len(t) - 1, 0), dtype=np.bool_), t_attitude)
-        R = kernel.local_level(where, site.latitude, site.longitude, site.height) @ R
+        i = np.maximum(np.searchsorted(t, t_attitude, side="right") - 1, 0)  # later positions were not known yet
+        before = np.maximum(i - 1, 0)
+        step = np.maximum(t[i] - t[before], 1e-3)[:, None]
+        where = p[i] + (t_attitude - t[i])[:, None] * ((p[i] - p[before]) / step)
+        R = kernel.local_level(np.ascontiguousarray(where), site.latitude, site.longitude, site.height) @ R
     q: FloatArray = rotations.quaternion_from_matrix(np.ascontiguousarray(R))
     return q
 

@@ -205,7 +205,7 @@ def _looks(entries: list[Any], path: Path) -> dict[str, Any]:
         if not isinstance(item, dict):
             _fail(path, i, f"is {item!r}, expected an object with sensorID, time, ownshipPosition, measurement")
         t, number = _number(path, i, item, "time"), item.get("sensorID")
-        if number not in SENSORS or isinstance(number, bool):
+        if type(number) is not int or number not in SENSORS:
             _fail(path, i, f"sensorID = {number!r}; known are 1 lidar, 2 radar, 3 IR, 4 EO")
         _point(path, i, item, "ownshipPosition")
         sensor, scan = SENSORS[number].id, counts[number]

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from boresight.errors import UserError, did_you_mean
+from boresight.io import limits
 from boresight.io.toml import TableModel, convert, read_toml, write_toml
-from boresight.types import Axes, Component, Coverage, Mount, Reporting, Sensor, SensorKind, Site
+from boresight.types import Axes, Component, Coverage, Mount, Reporting, Sensor, SensorKind, Site, Station
 
 DEG = math.pi / 180.0
 SIGMA_KEYS: dict[str, tuple[tuple[Component, ...], float]] = {
@@ -40,6 +41,17 @@ class MountTable(TableModel, frozen=True):
     lever_arm_frd_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
+class PositionTable(TableModel, frozen=True):
+    """`position = {…}` of a sensor that stands at a place of its own: geodetic, or in the site's east/north/up."""
+
+    latitude_deg: float | None = None
+    longitude_deg: float | None = None
+    height_m: float | None = None
+    east_m: float | None = None
+    north_m: float | None = None
+    up_m: float | None = None
+
+
 class CoverageTable(TableModel, frozen=True):
     """`coverage = {…}` of a sensor."""
 
@@ -54,7 +66,8 @@ class SensorTable(TableModel, frozen=True):
     id: str
     kind: str
     platform: str | None = None
-    axes: str = "site_enu"
+    axes: str | None = None  # platform_enu where a platform is named, else site_enu
+    position: PositionTable | None = None
     mount: MountTable = MountTable()
     sigma_range_m: float | None = None
     sigma_azimuth_deg: float | None = None
@@ -94,32 +107,37 @@ class Declaration:
 def read_declaration(path: Path | str) -> Declaration:
     """Read and check a recording.toml; raises UserError that names file and key."""
     where = str(path)
-    table = convert(read_toml(path), RecordingTable, where)
+    return declaration_of(convert(read_toml(path), RecordingTable, where), where)
+
+
+def declaration_of(table: RecordingTable, where: str) -> Declaration:
+    """Check the tables of a recording.toml, called `where` in errors."""
     if table.format != 1:
         raise UserError(f"{where}: format = {table.format}; this version reads format = 1")
     if table.dimensions not in (2, 3):
         raise UserError(f"{where}: dimensions = {table.dimensions}; give 2 or 3")
     if not table.sensor:
         raise UserError(f"{where}: no [[sensor]] table; declare at least one sensor")
-    sensors = tuple(sensor_of(s, where) for s in table.sensor)
+    site = site_of(table.site, where)
+    sensors = tuple(sensor_of(s, where, site, table.dimensions) for s in table.sensor)
     ids = [s.id for s in sensors]
     for i in ids:
         if ids.count(i) > 1:
             raise UserError(f"{where}: sensor id '{i}' stands twice; give each sensor its own id")
-    return Declaration(table.name, table.dimensions, site_of(table.site, where), sensors)
+    return Declaration(table.name, table.dimensions, site, sensors)
 
 
 def site_of(table: SiteTable, where: str) -> Site:
     """Return the Site of a `[site]` table."""
-    for key, limit in (("latitude_deg", 90.0), ("longitude_deg", 360.0), ("height_m", math.inf)):
+    for key, limit in (("latitude_deg", 90.0), ("longitude_deg", 180.0), ("height_m", math.inf)):
         value = getattr(table, key)
         if not (math.isfinite(value) and abs(value) <= limit):
             raise UserError(f"{where}: site.{key} = {value} is out of range")
     return Site(table.latitude_deg * DEG, table.longitude_deg * DEG, table.height_m)
 
 
-def sensor_of(table: SensorTable, where: str) -> Sensor:
-    """Return the Sensor of a `[[sensor]]` table."""
+def sensor_of(table: SensorTable, where: str, site: Site | None = None, dimensions: int = 3) -> Sensor:
+    """Return the Sensor of a `[[sensor]]` table; a geodetic `position` needs the site. Raises UserError."""
     if not table.id:
         raise UserError(f"{where}: a [[sensor]] has an empty id")
     at = f"{where}: sensor '{table.id}'"
@@ -146,7 +164,7 @@ def sensor_of(table: SensorTable, where: str) -> Sensor:
         id=table.id,
         kind=SensorKind(_word(at, "kind", table.kind, list(SensorKind))),
         platform=table.platform,
-        axes=Axes(_word(at, "axes", table.axes, list(Axes))),
+        axes=_axes(table, at),
         mount=mount_of(table.mount, at),
         sigma=sigma,
         latency=table.latency_s,
@@ -154,10 +172,74 @@ def sensor_of(table: SensorTable, where: str) -> Sensor:
         p_detection=table.p_detection,
         clutter_per_scan=clutter,
         coverage=coverage_of(table.coverage, at),
+        station=station_of(table, at, site, dimensions),
         reporting=Reporting(_word(at, "reporting", table.reporting, list(Reporting))),
         p_wrong_id=wrong,
         height=height,
     )
+
+
+def _axes(table: SensorTable, at: str) -> Axes:
+    """The declared axes; without, those of a sensor that moves with its platform, or stands fixed."""
+    if table.axes is None:
+        return Axes.PLATFORM_ENU if table.platform is not None else Axes.SITE_ENU
+    axes = Axes(_word(at, "axes", table.axes, list(Axes)))
+    if axes == Axes.SITE_ENU and table.platform is not None:
+        raise UserError(
+            f"{at}: rides on platform '{table.platform}', but axes = \"site_enu\" is for a sensor fixed at the site; "
+            'give axes = "platform_enu" (north-aligned), "body" or "mount", or leave out the platform'
+        )
+    return Axes.SITE_ENU if axes == Axes.PLATFORM_ENU and table.position is not None else axes
+
+
+def station_of(table: SensorTable, at: str, site: Site | None, dimensions: int) -> Station | None:
+    """Return where a fixed sensor stands: None at the site's origin. Raises UserError."""
+    p = table.position
+    if p is None:
+        return None
+    if table.platform is not None:
+        raise UserError(
+            f"{at}: has a position of its own and rides on platform '{table.platform}'; give one of the two"
+        )
+    geodetic, enu = (p.latitude_deg, p.longitude_deg, p.height_m), (p.east_m, p.north_m, p.up_m)
+    if (geodetic == (None, None, None)) == (enu == (None, None, None)):
+        raise UserError(f"{at}: position: give either latitude_deg, longitude_deg, height_m or east_m, north_m, up_m")
+    names = (
+        ("latitude_deg", "longitude_deg", "height_m") if enu == (None, None, None) else ("east_m", "north_m", "up_m")
+    )
+    values = []
+    for name in names:
+        value = getattr(p, name)
+        if value is None and name in ("height_m", "up_m") and dimensions == 2:
+            value = 0.0 if name == "up_m" or site is None else site.height
+        if value is None:
+            raise UserError(f"{at}: position: key '{name}' is missing")
+        if (why := limits.problem(name, value)) is not None:
+            raise UserError(f"{at}: position: {why}")
+        values.append(float(value))
+    return _station(values, names[0] == "latitude_deg", at, site, dimensions)
+
+
+def _station(values: list[float], geodetic: bool, at: str, site: Site | None, dimensions: int) -> Station:
+    from boresight.frames.local import (  # compiled code: loaded only where it is needed
+        ecef_from_enu_rotation,
+        enu_from_geodetic,
+        geodetic_from_enu,
+    )
+
+    if site is None:
+        if geodetic:
+            raise UserError(f"{at}: position: latitude and longitude need a [site]; give east_m, north_m, up_m")
+        return Station((values[0], values[1], values[2] if dimensions == 3 else 0.0))
+    if geodetic:
+        here = Site(values[0] * DEG, values[1] * DEG, values[2])
+        east, north, up = (float(v) for v in enu_from_geodetic(here.latitude, here.longitude, here.height, site))
+    else:
+        east, north, up = values
+        here = Site(*(float(v) for v in geodetic_from_enu(east, north, up, site)))
+    turn = ecef_from_enu_rotation(site).T @ ecef_from_enu_rotation(here)
+    rows = tuple((float(a), float(b), float(c)) for a, b, c in turn)
+    return Station((east, north, up if dimensions == 3 else 0.0), rows)
 
 
 def mount_of(table: MountTable, at: str) -> Mount:
@@ -203,6 +285,9 @@ def _sensor_table(sensor: Sensor) -> dict[str, Any]:
     if sensor.platform is not None:
         table["platform"] = sensor.platform
     mount, cover = sensor.mount, sensor.coverage
+    if sensor.station is not None:
+        east, north, up = sensor.station.position
+        table["position"] = {"east_m": east, "north_m": north, "up_m": up}
     table["axes"] = str(sensor.axes)
     table["mount"] = {
         "yaw_deg": _deg(mount.yaw),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,9 +11,11 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from boresight.errors import did_you_mean
+from boresight.io import limits
 from boresight.io.declaration import DEG, SIGMA_KEYS
-from boresight.io.table import LIST, NUMBER, TEXT, WHOLE, Table, nullable
-from boresight.types import N_COMPONENTS, Axes, Component, Detections, FloatArray, Sensor
+from boresight.io.stamps import examine
+from boresight.io.table import LIST, NUMBER, TEXT, WHOLE, Table, in_unit, nullable
+from boresight.types import N_COMPONENTS, Axes, Component, Detections, FloatArray, Recording, Sensor
 
 POLAR = ("range_m", "azimuth_deg", "elevation_deg", "range_rate_m_s")
 CARTESIAN = ("x_m", "y_m", "z_m")
@@ -32,18 +36,22 @@ UNITS = np.array([1.0, DEG, DEG, 1.0, 1.0, 1.0, 1.0])
 SIGMA_KEY_OF = {component: key for key, (components, _) in SIGMA_KEYS.items() for component in components}
 
 # forward, right, down (as filed for body and mount axes) to the east/north/up-like columns: right, forward, -down
-_ENU_FROM_FRD = np.eye(N_COMPONENTS)
-_ENU_FROM_FRD[4:, 4:] = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
+ENU_FROM_FRD = np.eye(N_COMPONENTS)
+ENU_FROM_FRD[4:, 4:] = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
 
-_FRD_ORDER = [0, 1, 2, 3, 5, 4, 6]
+FRD_ORDER = [0, 1, 2, 3, 5, 4, 6]
 
 
-def _is_frd(sensor: Sensor) -> bool:
+def is_frd(sensor: Sensor) -> bool:
     return sensor.axes in (Axes.BODY, Axes.MOUNT)
 
 
-def detections_of(table: Table, sensors: tuple[Sensor, ...]) -> tuple[Detections, NDArray[np.bool_]]:
-    """Return the detections of a table and which rows repeat an earlier one.
+def detections_of(
+    table: Table, sensors: tuple[Sensor, ...], others: Sequence[tuple[str, float, float]] = ()
+) -> tuple[Detections, NDArray[np.bool_], dict[int, str]]:
+    """Return the detections of a table, which rows repeat an earlier one, and which are refused with the reason.
+
+    `others` are name, first and last stamp (s) of platforms and targets. What the user is to know goes to the notes.
 
     Raises UserError for an unknown sensor, a value that cannot be, or a measured component without any sigma.
     """
@@ -53,23 +61,27 @@ def detections_of(table: Table, sensors: tuple[Sensor, ...]) -> tuple[Detections
         table.fail(None, "the table has no rows")
     t = table.numbers("t_s", required=True)
     sensor = _sensors(table, sensors)
-    z = _turned(_measured(table), sensors, sensor)
+    filed, emptied = _measured(table)
+    z = turned(filed, sensors, sensor)
     sigma = _sigmas(table, sensors, sensor, z)
     covariance = _covariances(table, sensors, sensor, z, sigma)
     _check_noise(table, sensors, sensor, z, sigma)
-    recv = table.numbers("t_recv_s")
+    scan = table.whole("scan")
+    stamps = examine(t, table.numbers("t_recv_s"), sensor, scan, sensors, others, table.place)
+    refused = stamps.refused | dict.fromkeys(emptied, 'all that it measures says "not available"')
+    table.notes.extend(f"{table.path}: {f.text}" for f in stamps.findings)
     detections = Detections(
         t=t,
-        t_recv=np.maximum.accumulate(np.where(np.isnan(recv), np.maximum.accumulate(t), recv)),
+        t_recv=stamps.arrival,
         sensor=sensor,
-        scan=table.whole("scan"),
+        scan=scan,
         z=z,
         sigma=sigma,
         covariance=covariance,
         source_id=table.objects("source_id"),
         attributes=table.objects("attributes"),
     )
-    return detections, find_duplicates(detections)
+    return detections, find_duplicates(detections), dict(sorted(refused.items()))
 
 
 def _sensors(table: Table, sensors: tuple[Sensor, ...]) -> NDArray[np.int64]:
@@ -84,16 +96,18 @@ def _sensors(table: Table, sensors: tuple[Sensor, ...]) -> NDArray[np.int64]:
     return sensor
 
 
-def _measured(table: Table) -> FloatArray:
-    z = np.stack([table.numbers(name) for name in MEASURED], axis=1)
-    table.fail_where(z[:, Component.RANGE] < 0, "range_m is {}; a range is not negative", z[:, Component.RANGE])
-    elevation = z[:, Component.ELEVATION]
-    table.fail_where(np.abs(elevation) > 90.0, "elevation_deg is {}, outside -90 .. 90", elevation)
+def _measured(table: Table) -> tuple[FloatArray, list[int]]:
+    """What was measured (n, 7), and the rows in which all of it says "not available"."""
+    given = np.stack([table.numbers(name) for name in MEASURED], axis=1)
+    far = given[:, Component.RANGE]
+    table.fail_where((far < 0) & ~limits.absent("range_m", far), "range_m is {}; a range is not negative", far)
+    z = np.stack([table.checked(name) for name in MEASURED], axis=1)
+    emptied = np.flatnonzero(np.isnan(z).all(axis=1) & ~np.isnan(given).all(axis=1)).tolist()
     azimuth = z[:, Component.AZIMUTH]
     outside = (azimuth > 180.0) | (azimuth <= -180.0)
     azimuth[outside] = 180.0 - np.mod(180.0 - azimuth[outside], 360.0)  # into (-180, 180]
     out: FloatArray = z * UNITS
-    return out
+    return out, emptied
 
 
 def _sigmas(table: Table, sensors: tuple[Sensor, ...], sensor: NDArray[np.int64], z: FloatArray) -> FloatArray:
@@ -109,9 +123,9 @@ def _sigmas(table: Table, sensors: tuple[Sensor, ...], sensor: NDArray[np.int64]
     return sigma
 
 
-def _turned(z: FloatArray, sensors: tuple[Sensor, ...], sensor: NDArray[np.int64]) -> FloatArray:
+def turned(z: FloatArray, sensors: tuple[Sensor, ...], sensor: NDArray[np.int64]) -> FloatArray:
     """Forward/right/down to the east/north/up-like columns, and back: the turn is its own inverse."""
-    frd = np.array([_is_frd(s) for s in sensors])[sensor]
+    frd = np.array([is_frd(s) for s in sensors])[sensor]
     z[frd, 4:] = z[frd][:, [5, 4, 6]] * [1.0, 1.0, -1.0]
     return z
 
@@ -124,8 +138,8 @@ def _covariances(
     for row, upper in enumerate(table.objects("covariance") or ()):
         if upper is None:
             continue
-        frd = _is_frd(sensors[sensor[row]])
-        filed = z[row, _FRD_ORDER] if frd else z[row]
+        frd = is_frd(sensors[sensor[row]])
+        filed = z[row, FRD_ORDER] if frd else z[row]
         index = np.flatnonzero(~np.isnan(filed))
         m = len(index)
         if len(upper) != m * (m + 1) // 2:
@@ -140,7 +154,7 @@ def _covariances(
         full = np.zeros((N_COMPONENTS, N_COMPONENTS))
         full[np.ix_(index, index)] = block
         if frd:
-            full = _ENU_FROM_FRD @ full @ _ENU_FROM_FRD.T
+            full = ENU_FROM_FRD @ full @ ENU_FROM_FRD.T
         missing = np.isnan(z[row])
         full[missing] = np.nan
         full[:, missing] = np.nan
@@ -177,6 +191,25 @@ def find_duplicates(detections: Detections) -> NDArray[np.bool_]:
     return twins
 
 
+def in_order(detections: Detections, order: NDArray[np.int64]) -> Detections:
+    """Return the rows in another order (n,)."""
+    place = {int(row): i for i, row in enumerate(order)}
+    parts = {name: getattr(detections, name)[order] for name in ("t", "t_recv", "sensor", "scan", "z", "sigma")}
+    texts = [detections.source_id, detections.attributes]
+    source, attributes = (None if one is None else [one[i] for i in order.tolist()] for one in texts)
+    covariance = {place[row]: full for row, full in detections.covariance.items()}
+    return Detections(**parts, covariance=covariance, source_id=source, attributes=attributes)
+
+
+def reordered(recording: Recording) -> Recording:
+    """Return a recording whose detections stand in order of arrival."""
+    order = np.argsort(recording.detections.t_recv, kind="stable")
+    place = {int(row): i for i, row in enumerate(order)}
+    refused = {place[row]: why for row, why in recording.refused.items()}
+    rows = in_order(recording.detections, order)
+    return replace(recording, detections=rows, duplicates=find_duplicates(rows), refused=dict(sorted(refused.items())))
+
+
 def columns_of(detections: Detections, sensors: tuple[Sensor, ...]) -> dict[str, Any]:
     """Return the columns of detections.parquet; only columns that hold something."""
     sensor = detections.sensor
@@ -187,7 +220,7 @@ def columns_of(detections: Detections, sensors: tuple[Sensor, ...]) -> dict[str,
         "sensor": pa.array(ids[sensor], pa.string()),
         "scan": detections.scan,
     }
-    z = _turned(detections.z.copy(), sensors, sensor) / UNITS
+    z = in_unit(turned(detections.z.copy(), sensors, sensor), UNITS)
     for i, name in enumerate(MEASURED):
         if not np.isnan(z[:, i]).all() or name == "range_m":
             out[name] = nullable(z[:, i])
@@ -201,7 +234,7 @@ def columns_of(detections: Detections, sensors: tuple[Sensor, ...]) -> dict[str,
             first = np.where(np.isnan(first), other, first)
         first = np.where((first == declared[:, components[0]]) | full, np.nan, first)
         if not np.isnan(first).all():
-            out[key] = nullable(first / unit)
+            out[key] = nullable(in_unit(first, unit))
     if detections.covariance:
         out["covariance"] = pa.array(_upper(detections, sensors), pa.list_(pa.float64()))
     for name in ("source_id", "attributes"):
@@ -215,9 +248,9 @@ def _upper(detections: Detections, sensors: tuple[Sensor, ...]) -> list[list[flo
     for row, full in detections.covariance.items():
         known = ~np.isnan(np.diag(full))
         filed = np.nan_to_num(full)
-        if _is_frd(sensors[detections.sensor[row]]):
-            filed = _ENU_FROM_FRD.T @ filed @ _ENU_FROM_FRD
-            known = known[_FRD_ORDER]
+        if is_frd(sensors[detections.sensor[row]]):
+            filed = ENU_FROM_FRD.T @ filed @ ENU_FROM_FRD
+            known = known[FRD_ORDER]
         block = filed[np.ix_(known, known)]
         out[row] = [float(v) for v in block[np.triu_indices(len(block))]]
     return out

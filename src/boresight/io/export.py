@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from boresight.errors import UserError
 from boresight.frames.local import geodetic_from_enu
-from boresight.io.paths import ENU, GEODETIC, VELOCITY
-from boresight.io.results import COVARIANCE
-from boresight.types import STATUSES, FloatArray, Site, TrackRows
+from boresight.io.paths import GEODETIC
+from boresight.types import COVARIANCE, ENU, STATUSES, VELOCITY, FloatArray, Site, TrackRows
 
 FORMATS = ("csv", "geojson", "kml")
 
@@ -110,5 +109,11 @@ def _kml(rows: TrackRows, places: FloatArray, name: str) -> str:
 
 
 def _when(t: float) -> str:
-    """KML's time of Unix seconds (times from another epoch count from 1970)."""
-    return datetime.fromtimestamp(round(t, 3), UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ")
+    """KML's time of Unix seconds (times from another epoch count from 1970); raises UserError for what is no date."""
+    try:
+        return datetime.fromtimestamp(round(t, 3), UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ")
+    except (ValueError, OverflowError, OSError):
+        raise UserError(
+            f"--to kml: t_s = {t:.10g} is no date in seconds since 1970 (milliseconds?); import the recording with "
+            "--time-unit, or export csv or geojson"
+        ) from None

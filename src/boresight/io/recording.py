@@ -13,6 +13,8 @@ from boresight.io import detections as det
 from boresight.io import paths
 from boresight.io.declaration import Declaration, read_declaration, write_declaration
 from boresight.io.files import RECORDING, output_folder
+from boresight.io.livelog import is_log
+from boresight.io.stamps import newest
 from boresight.io.table import Table, read_table, write_table
 from boresight.types import Axes, Detections, PlatformTrack, Recording, Sensor
 
@@ -20,12 +22,17 @@ from boresight.types import Axes, Detections, PlatformTrack, Recording, Sensor
 def read_recording(path: Path | str) -> Recording:
     """Read and check a recording folder: SI, radians, the site's east/north/up; without a name it goes by its folder's.
 
-    Raises UserError with one line that names file, row or key, and what to do.
+    The log of a live run is read as the recording that gives the same tracks. Raises UserError with one line that names
+    file, row or key, and what to do.
     """
     folder = Path(path)
     if not folder.is_dir():
         what = "is a file, not a recording folder" if folder.exists() else "no such recording folder"
         raise UserError(f"{folder}: {what}")
+    if is_log(folder):
+        from boresight.io.logged import recording_of_log  # compiled code: loaded only where it is needed
+
+        return recording_of_log(folder)
     declared = read_declaration(folder / "recording.toml")
     declared = replace(declared, name=declared.name or folder.resolve().name)
     detections = read_table(folder / "detections.parquet", det.SCHEMA, det.REQUIRED)
@@ -50,8 +57,11 @@ def assemble(
     where: str = "",
 ) -> Recording:
     """Check tables against the declaration and return the recording; raises UserError."""
-    rows, duplicates = det.detections_of(detections, declared.sensors)
     platforms = paths.platforms_of(platform, declared.site, declared.dimensions) if platform is not None else ()
+    true = paths.truths_of(truth, declared.dimensions) if truth is not None else ()
+    others = [(f"platform '{p.id}'", float(p.t[0]), float(p.t[-1])) for p in platforms]
+    others += [(f"target '{p.target}' of the truth", float(p.t[0]), float(p.t[-1])) for p in true]
+    rows, duplicates, refused = det.detections_of(detections, declared.sensors, others)
     check_navigation(declared.sensors, rows, platforms, where)
     return Recording(
         name=declared.name,
@@ -60,9 +70,13 @@ def assemble(
         sensors=declared.sensors,
         detections=rows,
         platforms=platforms,
-        truth=paths.truths_of(truth, declared.dimensions) if truth is not None else (),
+        truth=true,
         ignore=paths.ignored_of(ignore) if ignore is not None else (),
         duplicates=duplicates,
+        refused=refused,
+        notes=tuple(
+            note for table in (detections, platform, truth, ignore) if table is not None for note in table.notes
+        ),
     )
 
 
@@ -81,9 +95,9 @@ def check_navigation(
                 f"{near}; add its rows to platform.parquet"
             )
         turned = sensor.axes in (Axes.BODY, Axes.MOUNT) or any(sensor.mount.lever_arm)
-        if turned and np.isnan(by_id[sensor.platform].ypr[:, 0]).any():
+        if turned and np.isnan(by_id[sensor.platform].ypr[:, 0]).all():
             raise UserError(
-                f"{where}: platform '{sensor.platform}' has rows without yaw_deg, which sensor '{sensor.id}' needs "
+                f"{where}: platform '{sensor.platform}' has no row with yaw_deg, which sensor '{sensor.id}' needs "
                 f"(axes = '{sensor.axes}', lever arm {list(sensor.mount.lever_arm)})"
             )
 
@@ -98,7 +112,10 @@ def write_recording(
     with output_folder(path, force, RECORDING) as folder:
         declared = Declaration(recording.name, recording.dimensions, recording.site, recording.sensors)
         (folder / "recording.toml").write_text(write_declaration(declared), encoding="utf-8")
-        write_table(folder / "detections.parquet", det.columns_of(recording.detections, recording.sensors))
+        columns = det.columns_of(recording.detections, recording.sensors)
+        if np.array_equal(recording.detections.t_recv, newest(recording.detections.t, recording.usable)):
+            del columns["t_recv_s"]  # what a reader finds by itself is not written as if it had been recorded
+        write_table(folder / "detections.parquet", columns)
         if recording.platforms:
             write_table(folder / "platform.parquet", paths.platform_columns(recording.platforms))
         if recording.truth:

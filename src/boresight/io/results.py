@@ -13,14 +13,15 @@ import pyarrow as pa
 
 from boresight.errors import UserError, did_you_mean
 from boresight.io.files import read_text
-from boresight.io.paths import ENU, VELOCITY
-from boresight.io.table import NUMBER, TEXT, WHOLE, Table, nullable, read_table, write_table
+from boresight.io.table import NUMBER, TEXT, WHOLE, Table, read_table, write_table
 from boresight.types import (
+    COVARIANCE,
+    ENU,
     FATES,
     NO_TRACK,
     STATUSES,
+    VELOCITY,
     DecisionRows,
-    FloatArray,
     Recording,
     RegistrationRows,
     Results,
@@ -38,14 +39,6 @@ REGISTRATION_SCHEMA: dict[str, str] = {
     "declared_sigma": NUMBER,
     "verdict": TEXT,
 }
-COVARIANCE = {
-    "cov_ee": (0, 0),
-    "cov_en": (0, 1),
-    "cov_nn": (1, 1),
-    "cov_eu": (0, 2),
-    "cov_nu": (1, 2),
-    "cov_uu": (2, 2),
-}
 TRACK_SCHEMA: dict[str, str] = {
     "t_s": NUMBER,
     "t_known_s": NUMBER,
@@ -61,12 +54,12 @@ def write_results(results: Results, recording: Recording, folder: Path) -> None:
 
     summary.json gets the key `recording` (name, dimensions, site), so that results can be exported by themselves.
     """
-    write_table(folder / "tracks.parquet", _track_columns(results.tracks))
+    write_table(folder / "tracks.parquet", results.tracks.columns())
     if results.smoothed is not None:
-        write_table(folder / SMOOTHED, _track_columns(results.smoothed))
+        write_table(folder / SMOOTHED, results.smoothed.columns())
     if results.registration is not None:
         write_table(folder / REGISTRATION, _registration_columns(results.registration))
-    write_table(folder / "decisions.parquet", _decision_columns(results.decisions))
+    write_table(folder / "decisions.parquet", results.decisions.columns())
     site = recording.site
     about = {
         "name": recording.name,
@@ -164,38 +157,6 @@ def _coded(table: Table, column: str, words: tuple[str, ...]) -> np.ndarray[Any,
             table.fail(int(np.argmax(codes == i)), f"{column} is '{word}', not known{did_you_mean(word, words)}")
     index = np.array([words.index(w) for w in found], dtype=np.uint8)
     return index[codes] if len(index) else np.zeros(0, dtype=np.uint8)
-
-
-def _track_columns(rows: TrackRows) -> dict[str, Any]:
-    out: dict[str, Any] = {
-        "t_s": rows.t,
-        "t_known_s": rows.t_known,
-        "track_id": rows.track_id.astype(np.int64),
-        "status": _words(rows.status, STATUSES),
-    }
-    out |= {n: nullable(_floats(rows.position[:, i])) for i, n in enumerate(ENU)}
-    out |= {n: nullable(_floats(rows.velocity[:, i])) for i, n in enumerate(VELOCITY)}
-    return out | {n: nullable(_floats(rows.covariance[:, i, j])) for n, (i, j) in COVARIANCE.items()}
-
-
-def _decision_columns(rows: DecisionRows) -> dict[str, Any]:
-    out: dict[str, Any] = {
-        "row": rows.row.astype(np.int64),
-        "fate": _words(rows.fate, FATES),
-        "track_id": pa.array(rows.track_id.astype(np.int64), mask=rows.track_id == NO_TRACK),
-        "nis": nullable(_floats(rows.nis)),
-        "reason": pa.array(rows.reason.tolist(), pa.string()),
-    }
-    return out | {name: pa.array(values, from_pandas=True) for name, values in rows.extra.items()}
-
-
-def _floats(values: FloatArray) -> FloatArray:
-    return np.ascontiguousarray(values, dtype=np.float64)
-
-
-def _words(codes: np.ndarray[Any, np.dtype[np.uint8]], words: tuple[str, ...]) -> pa.Array:
-    names = np.array([str(w) for w in words], dtype=object)
-    return pa.array(names[codes], pa.string())
 
 
 def finite(value: Any) -> Any:

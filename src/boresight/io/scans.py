@@ -14,17 +14,20 @@ from boresight.types import Detections, FloatArray, Recording, Scan, address_cod
 def iter_scans(recording: Recording, sensors: Sequence[str] | None = None) -> Iterator[Scan]:
     """Yield every scan in order of arrival (all sensors, or those with the given ids).
 
-    Rows that share (sensor, scan) are one scan, wherever they stand; it arrives with its last row, duplicates left
-    out. Looks that saw nothing are yielded with their rows in `empty_rows`. Raises UserError for an unknown sensor.
+    Rows that share (sensor, scan) are one scan, wherever they stand; it arrives with its last row, duplicates and
+    refused rows left out. Looks that saw nothing are yielded with their rows in `empty_rows`. Raises UserError for an
+    unknown sensor.
     """
     d = recording.detections
-    rows = np.flatnonzero(~recording.duplicates & np.isin(d.sensor, selected(recording, sensors)))
+    rows = np.flatnonzero(~recording.duplicates & recording.usable & np.isin(d.sensor, selected(recording, sensors)))
     if len(rows) == 0:
         return
     _, group = np.unique(np.stack([d.sensor[rows], d.scan[rows]], axis=1), axis=0, return_inverse=True)
     last = np.zeros(int(group.max()) + 1, dtype=np.int64)
     np.maximum.at(last, group, rows)
-    rows = rows[np.lexsort((rows, last[group]))]
+    arrival = np.full(len(last), -np.inf)
+    np.maximum.at(arrival, group, d.t_recv[rows])
+    rows = rows[np.lexsort((rows, last[group], arrival[group]))]
     yield from _cut(d, rows, _starts(d, rows))
 
 

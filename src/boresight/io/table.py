@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from boresight.errors import UserError, did_you_mean
+from boresight.io import limits
 from boresight.io.files import read_bytes, read_text
 from boresight.types import FloatArray
 
@@ -28,6 +29,8 @@ class Table:
     path: Path
     data: pa.Table
     csv_lines: bool = False
+    notes: list[str] = field(default_factory=list)  # what a reader of the table is to know
+    origin: list[tuple[Path, int]] | None = None  # file and line of each row, where they are not in order
 
     def __len__(self) -> int:
         return int(self.data.num_rows)
@@ -37,8 +40,14 @@ class Table:
 
     def fail(self, row: int | None, text: str) -> NoReturn:
         """Raise UserError for a row (counted from 0; of a CSV: its line) or for the whole file."""
-        place = "" if row is None else f" line {row + 2}:" if self.csv_lines else f" row {row}:"
-        raise UserError(f"{self.path}:{place} {text}")
+        path = self.origin[row][0] if self.origin is not None and row is not None else self.path
+        raise UserError(f"{path}:{'' if row is None else f' {self.place(row)}:'} {text}")
+
+    def place(self, row: int) -> str:
+        """Return a row (counted from 0) in words: of a CSV its line."""
+        if self.origin is not None:
+            return f"line {self.origin[row][1]}"
+        return f"line {row + 2}" if self.csv_lines else f"row {row}"
 
     def fail_where(self, bad: NDArray[np.bool_], text: str, values: Any = None) -> None:
         """Raise UserError for the first row where `bad` holds; `{}` in `text` becomes its value."""
@@ -52,12 +61,32 @@ class Table:
             return np.full(len(self), default)
         column = self.data.column(name).combine_chunks()
         null = np.asarray(column.is_null())
-        values = np.array(column.cast(pa.float64()).fill_null(0.0).to_numpy(zero_copy_only=False), dtype=np.float64)
+        values = np.array(
+            column.cast(pa.float64(), safe=False).fill_null(0.0).to_numpy(zero_copy_only=False), dtype=np.float64
+        )
         word = "leave it empty" if self.csv_lines else "leave it null"
         self.fail_where(~np.isfinite(values), f"{name} is {{}}; {word} when not measured", values)
         if required:
             self.fail_where(null, f"{name} is null; every row needs it")
         values[null] = default
+        return values
+
+    def checked(self, name: str, required: bool = False, default: float = np.nan) -> FloatArray:
+        """Return a column as `numbers` does, with NaN for "not available" (said in `notes`).
+
+        Raises UserError for a value outside the column's range (`io.limits`).
+        """
+        values = self.numbers(name, required, default)
+        missing = limits.absent(name, values)
+        bad = limits.outside(name, values) & ~missing
+        self.fail_where(bad, f"{name} is {{}}, outside {limits.span(name)}", values)
+        if missing.any():
+            row, n = int(np.argmax(missing)), int(missing.sum())
+            word = f'{name} = {values[row]:.10g} says "not available" ({limits.source(name, float(values[row]))})'
+            self.notes.append(
+                f"{self.path}: {self.place(row)}: {word}: taken as not measured in {n} of {len(self)} rows"
+            )
+            values[missing] = np.nan
         return values
 
     def whole(self, name: str) -> NDArray[np.int64]:
@@ -207,3 +236,12 @@ def write_table(path: Path, columns: Mapping[str, Any]) -> None:
     """Write columns as one Parquet file."""
     arrays = {k: v if isinstance(v, pa.Array | pa.ChunkedArray) else pa.array(v) for k, v in columns.items()}
     pq.write_table(pa.table(arrays), path, compression="zstd")
+
+
+def in_unit(values: FloatArray, unit: float | FloatArray) -> FloatArray:
+    """Return SI values in a unit (SI per unit) such that multiplying by it again gives the same bits where any do."""
+    out: FloatArray = values / unit
+    for toward in (np.inf, -np.inf):
+        near = np.nextafter(out, toward)
+        out = np.where((out * unit != values) & (near * unit == values), near, out)
+    return out

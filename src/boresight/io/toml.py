@@ -23,17 +23,26 @@ class TableModel(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, froze
 def read_toml(path: Path | str) -> dict[str, Any]:
     """Read a TOML file into plain values; raises UserError with the line of a syntax error."""
     path = Path(path)
+    return toml_of(read_text(path), str(path))
+
+
+def toml_of(text: str, where: str) -> dict[str, Any]:
+    """Return the plain values of a TOML text, called `where` in errors; raises UserError."""
     try:
-        return tomllib.loads(read_text(path))
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise UserError(f"{path}: not valid TOML: {error}") from None
+        raise UserError(f"{where}: not valid TOML: {error}") from None
+    except RecursionError:
+        raise UserError(f"{where}: not valid TOML: tables or lists are nested too deeply") from None
 
 
 def convert(value: Any, model: type[T], where: str) -> T:
     """Convert plain values into a TableModel; raises UserError that names the key under `where`."""
-    _check_keys(value, msgspec.inspect.type_info(model), where, "")
     try:
+        _check_keys(value, msgspec.inspect.type_info(model), where, "")
         return msgspec.convert(value, model)
+    except RecursionError:
+        raise UserError(f"{where}: tables or lists are nested too deeply") from None
     except msgspec.ValidationError as error:
         text, _, place = str(error).partition(" - at `$")
         key = place.rstrip("`").lstrip(".")
@@ -90,6 +99,11 @@ def _is_table(value: Any) -> bool:
     return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))
 
 
+def key(name: str) -> str:
+    """Return a key as TOML writes it: quoted where it holds more than letters, digits, - and _."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _inline(name)
+
+
 def _inline(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
@@ -99,5 +113,5 @@ def _inline(value: Any) -> str:
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
         return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in escaped) + '"'
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{k} = {_inline(v)}" for k, v in value.items()) + " }"
+        return "{ " + ", ".join(f"{key(k)} = {_inline(v)}" for k, v in value.items()) + " }"
     return "[" + ", ".join(_inline(v) for v in value) + "]"

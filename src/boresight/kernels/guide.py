@@ -1,8 +1,10 @@
 """The filter behind a beam: reports of several guide sources, each at its own time, in an inertial frame.
 
 The frame is the Earth's at t = 0: ECEF turned by the Earth's rotation since then. A state is position, velocity, for
-near-constant acceleration also acceleration, and at its end the bias (along, across, up of the motion, m) of one
-source. There is one state per hypothesis: "no source is biased", "source s is".
+near-constant acceleration also acceleration; then the constant biases of the sources that declare them (azimuth,
+elevation, range, time; every hypothesis estimates all of them); at its end what a hypothesis is about. There is one
+state per hypothesis: "no source is off"; "source s is", by a gross bias (along, across, up of the motion, m); and maybe
+"all are a little", by biases in angles and range that nobody declared.
 """
 
 from __future__ import annotations
@@ -19,12 +21,22 @@ J2 = 1.08262668e-3
 EARTH_RATE = 7.2921150e-5  # rad/s
 EQUATOR = 6378137.0  # m
 LONGEST = 10.0  # s, of one step of the integration
-# What a report holds: azimuth, elevation, range (NaN: none) in its axes; ECEF x, y, z; these and maybe a velocity.
+# What a report holds: azimuth, elevation, range in its axes (NaN: not measured); ECEF x, y, z; these and maybe a
+# velocity.
 DIRECTION, POSITION, TRACK = 0, 1, 2
 ORBIT, ACCELERATION = 0, 1  # dynamics
-# Rows of the one work array: a state then, an innovation, a report; matrices of 3, 3, 9, 6, 6, 6, 6 and 18 rows.
-THEN, Y, LOOK, B, A, F, H, G, S, R, W = 0, 1, 2, 3, 6, 9, 18, 24, 30, 36, 42
-WORK = (60, 12)
+N_BIAS = 4  # azimuth, elevation (rad), range (m), time (s): what a source may be off by
+BIAS_AZIMUTH, BIAS_ELEVATION, BIAS_RANGE, BIAS_TIME = range(N_BIAS)
+# Rows of the one work array, each as wide as a state: a state at the report's time, an innovation, a report (its
+# numbers, see `look_at`), coefficients of the second order; then matrices: axes of the report, of the motion, Jacobians
+# by the position, by the source's biases and by the state, transition, H P, S, R, and room to multiply in.
+ROW_THEN, ROW_Y, ROW_LOOK, ROW_SECOND = 0, 1, 2, 3
+ROW_AXES, ROW_MOTION, ROW_A, ROW_BIAS, ROW_F = 4, 7, 10, 13, 19
+ROW_H, ROW_G, ROW_S, ROW_R, ROW_ROOM = 28, 34, 40, 46, 52
+ROWS, LEAST_WIDTH = 70, 12
+# Columns of row LOOK: where the report was made, what it says, its variances, and how far the prediction is (m). Of a
+# position or track: the value.
+LOOK_ORIGIN, LOOK_Z, LOOK_VARIANCE, LOOK_ACROSS, LOOK_FAR = 0, 3, 6, 9, 10
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
@@ -69,13 +81,13 @@ def advance(x: FloatArray, dynamics: int, dt: float, w: FloatArray) -> None:
     h2 = 0.5 * dt * dt
     for i in range(m):
         for j in range(m):
-            w[F + i, j] = 1.0 if i == j else 0.0
+            w[ROW_F + i, j] = 1.0 if i == j else 0.0
     if dt == 0.0:
         return
     if dynamics == ACCELERATION:
         for i in range(3):
-            w[F + i, 3 + i] = w[F + 3 + i, 6 + i] = dt
-            w[F + i, 6 + i] = h2
+            w[ROW_F + i, 3 + i] = w[ROW_F + 3 + i, 6 + i] = dt
+            w[ROW_F + i, 6 + i] = h2
             x[i] += dt * x[3 + i] + h2 * x[6 + i]
             x[3 + i] += dt * x[6 + i]
         return
@@ -85,10 +97,10 @@ def advance(x: FloatArray, dynamics: int, dt: float, w: FloatArray) -> None:
     for i in range(3):
         for j in range(3):
             g = k3 * x[i] * x[j] - (k if i == j else 0.0)
-            w[F + i, j] += h2 * g
-            w[F + i, 3 + j] = h3 * g + (dt if i == j else 0.0)
-            w[F + 3 + i, j] = dt * g
-            w[F + 3 + i, 3 + j] += h2 * g
+            w[ROW_F + i, j] += h2 * g
+            w[ROW_F + i, 3 + j] = h3 * g + (dt if i == j else 0.0)
+            w[ROW_F + 3 + i, j] = dt * g
+            w[ROW_F + 3 + i, 3 + j] += h2 * g
     fly(x, dt)
 
 
@@ -106,21 +118,21 @@ def carry(m: int, P: FloatArray, w: FloatArray) -> None:
     """Set the block (m, m) of `P` to F P F'; call it with `m` a constant, so that the compiler unrolls its loops."""
     for i in range(m):
         for j in range(m):
-            w[W + j, i] = w[F + i, j]
+            w[ROW_ROOM + j, i] = w[ROW_F + i, j]
     for i in range(m):  # P F'
         for j in range(m):
-            w[W + m + i, j] = 0.0
+            w[ROW_ROOM + m + i, j] = 0.0
         for k in range(m):
             a = P[i, k]
             for j in range(m):
-                w[W + m + i, j] += a * w[W + k, j]
+                w[ROW_ROOM + m + i, j] += a * w[ROW_ROOM + k, j]
     for i in range(m):
         for j in range(m):
             P[i, j] = 0.0
         for k in range(m):
-            a = w[F + i, k]
+            a = w[ROW_F + i, k]
             for j in range(m):
-                P[i, j] += a * w[W + m + k, j]
+                P[i, j] += a * w[ROW_ROOM + m + k, j]
     for i in range(m):
         for j in range(i):
             P[i, j] = P[j, i]
@@ -138,11 +150,11 @@ def predict(x: FloatArray, P: FloatArray, n: int, dynamics: int, q: float, dt: f
         carry(9, P, w)
     for j in range(m, n):
         for i in range(m):
-            w[W + i, 0] = P[i, j]
+            w[ROW_ROOM + i, 0] = P[i, j]
         for i in range(m):
             total = 0.0
             for k in range(m):
-                total += w[F + i, k] * w[W + k, 0]
+                total += w[ROW_F + i, k] * w[ROW_ROOM + k, 0]
             P[i, j] = P[j, i] = total
     for i in range(m // 3):
         for j in range(m // 3):
@@ -153,7 +165,7 @@ def predict(x: FloatArray, P: FloatArray, n: int, dynamics: int, q: float, dt: f
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def motion_axes(x: FloatArray, w: FloatArray) -> None:
-    """Fill rows B of `w` (3, 3) with columns along, across and up of the motion."""
+    """Fill rows MOTION of `w` (3, 3) with columns along, across and up of the motion."""
     r = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
     c0, c1, c2 = x[4] * x[2] - x[5] * x[1], x[5] * x[0] - x[3] * x[2], x[3] * x[1] - x[4] * x[0]
     c = math.sqrt(c0 * c0 + c1 * c1 + c2 * c2)
@@ -161,9 +173,11 @@ def motion_axes(x: FloatArray, w: FloatArray) -> None:
     if c < 1e-9 * r:
         c0, c1, c2, c = -u1, u0, 0.0, max(math.sqrt(u0 * u0 + u1 * u1), 1e-12)
     c0, c1, c2 = c0 / c, c1 / c, c2 / c
-    w[B, 0], w[B + 1, 0], w[B + 2, 0] = u1 * c2 - u2 * c1, u2 * c0 - u0 * c2, u0 * c1 - u1 * c0
-    w[B, 1], w[B + 1, 1], w[B + 2, 1] = c0, c1, c2
-    w[B, 2], w[B + 1, 2], w[B + 2, 2] = u0, u1, u2
+    w[ROW_MOTION, 0] = u1 * c2 - u2 * c1
+    w[ROW_MOTION + 1, 0] = u2 * c0 - u0 * c2
+    w[ROW_MOTION + 2, 0] = u0 * c1 - u1 * c0
+    w[ROW_MOTION, 1], w[ROW_MOTION + 1, 1], w[ROW_MOTION + 2, 1] = c0, c1, c2
+    w[ROW_MOTION, 2], w[ROW_MOTION + 1, 2], w[ROW_MOTION + 2, 2] = u0, u1, u2
 
 
 @njit(**PART)
@@ -178,88 +192,166 @@ def look_at(
     kind: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray, sigma: FloatArray, scale: float,
     w: FloatArray,
 ) -> int:  # fmt: skip
-    """Turn a report to the inertial frame, once for all hypotheses, into rows LOOK and R of `w`; the dimension.
+    """Turn a report to the inertial frame, once for all hypotheses, into row LOOK of `w`; how many numbers it holds.
 
-    A direction: where from, the unit vector there, range (m, NaN: none); R is diagonal, across (rad²) and along (m²).
-    A position or track: position, velocity; R is sigma² axes axes' (both turned to the inertial frame).
+    `sigma` (4,) of a direction: azimuth, elevation (rad), range (m), and whether the first counts across the line of
+    sight (1) or about the vertical (0). A number that is NaN, or that the source has no sigma for, was not measured.
+    Of a position or track `sigma[0]` is a factor: rows R hold sigma² axes axes' (turned to the inertial frame).
     """
     c, s = math.cos(EARTH_RATE * t), math.sin(EARTH_RATE * t)
-    a = sigma[0] * sigma[0] * scale
     if kind == DIRECTION:
-        w[LOOK, 0], w[LOOK, 1], w[LOOK, 2] = c * origin[0] - s * origin[1], s * origin[0] + c * origin[1], origin[2]
-        ce = math.cos(z[1])
-        w0, w1, w2 = ce * math.sin(z[0]), ce * math.cos(z[0]), math.sin(z[1])
-        u0 = axes[0, 0] * w0 + axes[0, 1] * w1 + axes[0, 2] * w2
-        u1 = axes[1, 0] * w0 + axes[1, 1] * w1 + axes[1, 2] * w2
-        w[LOOK, 3], w[LOOK, 4] = c * u0 - s * u1, s * u0 + c * u1
-        w[LOOK, 5] = axes[2, 0] * w0 + axes[2, 1] * w1 + axes[2, 2] * w2
-        w[LOOK, 6] = z[2]
-        for i in range(3):
-            for j in range(3):
-                w[R + i, j] = 0.0
-        w[R, 0] = w[R + 1, 1] = a
-        w[R + 2, 2] = sigma[1] * sigma[1] * scale
-        return 2 if math.isnan(z[2]) else 3
-    w[LOOK, 0], w[LOOK, 1], w[LOOK, 2] = c * z[0] - s * z[1], s * z[0] + c * z[1], z[2]
+        w[ROW_LOOK, 0], w[ROW_LOOK, 1], w[ROW_LOOK, 2] = (
+            c * origin[0] - s * origin[1],
+            s * origin[0] + c * origin[1],
+            origin[2],
+        )
+        for j in range(3):
+            w[ROW_AXES, j] = c * axes[0, j] - s * axes[1, j]
+            w[ROW_AXES + 1, j] = s * axes[0, j] + c * axes[1, j]
+            w[ROW_AXES + 2, j] = axes[2, j]
+        held = 0
+        for j in range(3):
+            measured = sigma[j] > 0.0 and not math.isnan(z[j])
+            w[ROW_LOOK, LOOK_Z + j] = z[j] if measured else math.nan
+            w[ROW_LOOK, LOOK_VARIANCE + j] = sigma[j] * sigma[j] * scale
+            held += measured
+        w[ROW_LOOK, LOOK_ACROSS] = sigma[3]
+        return held
+    a = sigma[0] * sigma[0] * scale
+    w[ROW_LOOK, 0], w[ROW_LOOK, 1], w[ROW_LOOK, 2] = c * z[0] - s * z[1], s * z[0] + c * z[1], z[2]
     k = 3
     if kind == TRACK and len(z) > 3:
         k = 6
-        w[LOOK, 3], w[LOOK, 4] = (
-            c * z[3] - s * z[4] - EARTH_RATE * w[LOOK, 1],
-            s * z[3] + c * z[4] + EARTH_RATE * w[LOOK, 0],
+        w[ROW_LOOK, 3], w[ROW_LOOK, 4] = (
+            c * z[3] - s * z[4] - EARTH_RATE * w[ROW_LOOK, 1],
+            s * z[3] + c * z[4] + EARTH_RATE * w[ROW_LOOK, 0],
         )
-        w[LOOK, 5] = z[5]
+        w[ROW_LOOK, 5] = z[5]
     for i in range(k):
         for j in range(i, k):
             total = 0.0
             for b in range(k):
                 total += axes[i, b] * axes[j, b]
-            w[R + i, j] = w[R + j, i] = total * a
+            w[ROW_R + i, j] = w[ROW_R + j, i] = total * a
     for first in range(0, k, 3):
         for j in range(k):
-            x, y = w[R + first, j], w[R + first + 1, j]
-            w[R + first, j], w[R + first + 1, j] = c * x - s * y, s * x + c * y
+            x, y = w[ROW_R + first, j], w[ROW_R + first + 1, j]
+            w[ROW_R + first, j], w[ROW_R + first + 1, j] = c * x - s * y, s * x + c * y
     for first in range(0, k, 3):
         for i in range(k):
-            x, y = w[R + i, first], w[R + i, first + 1]
-            w[R + i, first], w[R + i, first + 1] = c * x - s * y, s * x + c * y
+            x, y = w[ROW_R + i, first], w[ROW_R + i, first + 1]
+            w[ROW_R + i, first], w[ROW_R + i, first + 1] = c * x - s * y, s * x + c * y
     return k
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def compare(kind: int, k: int, w: FloatArray) -> None:
-    """Fill rows Y (k,) and A (3, 3), the Jacobian by the position, for the state in row THEN and the report in LOOK.
+def compare_position(dynamics: int, k: int, w: FloatArray) -> None:
+    """Fill rows Y (k,), A (3, 3), the Jacobian by the position (one), and BIAS (k, 4) for a position or track.
 
-    A direction is compared across the predicted line of sight (two small angles), so that no pole is special.
-    What is in Y beyond the third are velocities, whose Jacobian is one.
+    What is in Y beyond the third are velocities, whose Jacobian is one. A bias in time moves both along the way.
     """
-    if kind != DIRECTION:
-        for i in range(3):
-            for j in range(3):
-                w[A + i, j] = 1.0 if i == j else 0.0
-        for i in range(k):
-            w[Y, i] = w[LOOK, i] - w[THEN, i]
-        return
-    d0, d1, d2 = w[THEN, 0] - w[LOOK, 0], w[THEN, 1] - w[LOOK, 1], w[THEN, 2] - w[LOOK, 2]
-    u0, u1, u2 = w[LOOK, 3], w[LOOK, 4], w[LOOK, 5]
+    for i in range(3):
+        for j in range(3):
+            w[ROW_A + i, j] = 1.0 if i == j else 0.0
+    for i in range(k):
+        w[ROW_Y, i] = w[ROW_LOOK, i] - w[ROW_THEN, i]
+        w[ROW_SECOND, i] = 0.0
+        for j in range(N_BIAS):
+            w[ROW_BIAS + i, j] = 0.0
+    w[ROW_BIAS, BIAS_TIME] = -w[ROW_THEN, 3] - EARTH_RATE * w[ROW_THEN, 1]
+    w[ROW_BIAS + 1, BIAS_TIME] = -w[ROW_THEN, 4] + EARTH_RATE * w[ROW_THEN, 0]
+    w[ROW_BIAS + 2, BIAS_TIME] = -w[ROW_THEN, 5]
+    if k > 3:
+        if dynamics == ORBIT:
+            a0, a1, a2 = gravity(w[ROW_THEN, 0], w[ROW_THEN, 1], w[ROW_THEN, 2])
+        else:
+            a0, a1, a2 = w[ROW_THEN, 6], w[ROW_THEN, 7], w[ROW_THEN, 8]
+        w[ROW_BIAS + 3, BIAS_TIME], w[ROW_BIAS + 4, BIAS_TIME], w[ROW_BIAS + 5, BIAS_TIME] = -a0, -a1, -a2
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def compare_direction(bias_azimuth: float, bias_elevation: float, bias_range: float, w: FloatArray) -> None:
+    """Fill rows Y (k,), A (k, 3), the Jacobian by the position, BIAS (k, 4), R (k, k) and SECOND (k,) for a direction.
+
+    The state is in row THEN, the report in LOOK, the biases (rad, rad, m) are those that the state holds. Both angles
+    are compared across the predicted line of sight, so that no pole is special: the measurement's own east and up,
+    carried to it along the great circle. One angle alone is compared at the prediction; SECOND holds what its
+    curvature adds to its variance for the square of the predicted variance.
+    """
+    d0, d1, d2 = w[ROW_THEN, 0] - w[ROW_LOOK, 0], w[ROW_THEN, 1] - w[ROW_LOOK, 1], w[ROW_THEN, 2] - w[ROW_LOOK, 2]
     r = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-    e0, e1, e2 = d0 / r, d1 / r, d2 / r
-    # two unit vectors across the line of sight
-    if abs(e2) < 0.9:
-        q = 1.0 / math.sqrt(e0 * e0 + e1 * e1)
-        f0, f1, f2 = -e1 * q, e0 * q, 0.0
+    w[ROW_LOOK, LOOK_FAR] = r
+    d0, d1, d2 = d0 / r, d1 / r, d2 / r
+    azimuth, elevation = w[ROW_LOOK, LOOK_Z] - bias_azimuth, w[ROW_LOOK, LOOK_Z + 1] - bias_elevation
+    both = not (math.isnan(azimuth) or math.isnan(elevation))
+    # the prediction in the report's own axes
+    p0 = w[ROW_AXES, 0] * d0 + w[ROW_AXES + 1, 0] * d1 + w[ROW_AXES + 2, 0] * d2
+    p1 = w[ROW_AXES, 1] * d0 + w[ROW_AXES + 1, 1] * d1 + w[ROW_AXES + 2, 1] * d2
+    p2 = w[ROW_AXES, 2] * d0 + w[ROW_AXES + 1, 2] * d1 + w[ROW_AXES + 2, 2] * d2
+    if both:
+        sa, ca, se, ce = math.sin(azimuth), math.cos(azimuth), math.sin(elevation), math.cos(elevation)
     else:
-        q = 1.0 / math.sqrt(e1 * e1 + e2 * e2)
-        f0, f1, f2 = 0.0, -e2 * q, e1 * q
-    g0, g1, g2 = e1 * f2 - e2 * f1, e2 * f0 - e0 * f2, e0 * f1 - e1 * f0
-    a = f0 * u0 + f1 * u1 + f2 * u2
-    b = g0 * u0 + g1 * u1 + g2 * u2
-    along = e0 * u0 + e1 * u1 + e2 * u2
-    across = math.sqrt(a * a + b * b)
-    q = math.atan2(across, along) / across if across > 1e-12 else 1.0
-    w[Y, 0], w[Y, 1] = q * a, q * b
-    w[A, 0], w[A, 1], w[A, 2] = f0 / r, f1 / r, f2 / r
-    w[A + 1, 0], w[A + 1, 1], w[A + 1, 2] = g0 / r, g1 / r, g2 / r
-    if k == 3:
-        w[Y, 2] = w[LOOK, 6] - r
-        w[A + 2, 0], w[A + 2, 1], w[A + 2, 2] = e0, e1, e2
+        ce, se = max(math.sqrt(p0 * p0 + p1 * p1), 1e-6), p2
+        sa, ca = p0 / ce, p1 / ce
+    # east and up across the line of sight, in the report's axes
+    a0, a1, a2 = ca, -sa, 0.0
+    e0, e1, e2 = -se * sa, -se * ca, ce
+    ya, ye = 0.0, 0.0
+    if both:
+        u0, u1, u2 = ce * sa, ce * ca, se
+        pa = a0 * p0 + a1 * p1
+        pe = e0 * p0 + e1 * p1 + e2 * p2
+        pu = u0 * p0 + u1 * p1 + u2 * p2
+        across = math.sqrt(pa * pa + pe * pe)
+        q = math.atan2(across, pu) / across if across > 1e-12 else 1.0
+        ya, ye = -q * pa, -q * pe
+        if pu > -0.999:
+            q = 1.0 / (1.0 + pu)
+            a0, a1, a2 = a0 - q * pa * (u0 + p0), a1 - q * pa * (u1 + p1), -q * pa * (u2 + p2)
+            e0, e1, e2 = e0 - q * pe * (u0 + p0), e1 - q * pe * (u1 + p1), e2 - q * pe * (u2 + p2)
+    elif not math.isnan(azimuth):
+        ya = azimuth - math.atan2(p0, p1)
+        ya = ce * math.atan2(math.sin(ya), math.cos(ya))
+    else:
+        ye = elevation - math.atan2(p2, ce)
+    va, ve = w[ROW_LOOK, LOOK_VARIANCE], w[ROW_LOOK, LOOK_VARIANCE + 1]
+    if w[ROW_LOOK, LOOK_ACROSS] == 0.0:  # about the vertical; at the zenith the noise of the elevation counts in it
+        va *= ce * ce + ve
+    k = 0
+    for part in range(3):
+        if math.isnan(w[ROW_LOOK, LOOK_Z + part]):
+            continue
+        for j in range(3):
+            w[ROW_R + k, j] = w[ROW_R + j, k] = 0.0
+            w[ROW_BIAS + k, j] = 0.0
+        w[ROW_SECOND, k] = 0.0
+        if part == 0:
+            x0, x1, x2, y, v, slope = a0 / r, a1 / r, a2 / r, ya, va, ce
+            if not both:
+                w[ROW_SECOND, k] = 1.0 / (ce * ce)
+        elif part == 1:
+            x0, x1, x2, y, v, slope = e0 / r, e1 / r, e2 / r, ye, ve, 1.0
+            if not both:
+                w[ROW_SECOND, k] = 0.75 * se * se / (ce * ce)
+        else:
+            x0, x1, x2, y, v, slope = (
+                p0,
+                p1,
+                p2,
+                w[ROW_LOOK, LOOK_Z + 2] - bias_range - r,
+                w[ROW_LOOK, LOOK_VARIANCE + 2],
+                1.0,
+            )
+        b0 = w[ROW_AXES, 0] * x0 + w[ROW_AXES, 1] * x1 + w[ROW_AXES, 2] * x2
+        b1 = w[ROW_AXES + 1, 0] * x0 + w[ROW_AXES + 1, 1] * x1 + w[ROW_AXES + 1, 2] * x2
+        b2 = w[ROW_AXES + 2, 0] * x0 + w[ROW_AXES + 2, 1] * x1 + w[ROW_AXES + 2, 2] * x2
+        w[ROW_Y, k] = y
+        w[ROW_A + k, 0], w[ROW_A + k, 1], w[ROW_A + k, 2] = b0, b1, b2
+        w[ROW_R + k, k] = v
+        w[ROW_BIAS + k, part] = slope
+        w[ROW_BIAS + k, BIAS_TIME] = -(
+            b0 * (w[ROW_THEN, 3] + EARTH_RATE * w[ROW_THEN, 1])
+            + b1 * (w[ROW_THEN, 4] - EARTH_RATE * w[ROW_THEN, 0])
+            + b2 * w[ROW_THEN, 5]
+        )
+        k += 1

@@ -1,4 +1,4 @@
-"""Poses as they were known at a time: from the stamps up to it alone."""
+"""Poses as they were known at a time: from the stamps that had arrived by then alone."""
 
 from __future__ import annotations
 
@@ -16,15 +16,18 @@ IntArray = NDArray[np.int64]
 
 
 @njit(**PART)
-def stamps_for(times: FloatArray, nodes: FloatArray, known: float, limits: tuple[float, float]) -> int:
-    """Return how many stamps are known until `known` (s), 0 where a pose at one of the `times` cannot come of them."""
-    n = int(np.searchsorted(nodes, known, side="right"))
+def stamps_for(
+    times: FloatArray, nodes: FloatArray, arrived: FloatArray, known: float, limits: tuple[float, float]
+) -> int:
+    """Return how many stamps had arrived by `known` (s), 0 where a pose at one of the `times` cannot come of them."""
+    n = int(np.searchsorted(arrived, known, side="right"))
     return n if n > 0 and first_uncovered(nodes[:n], times, limits[0], limits[1])[0] < 0 else 0
 
 
 @njit(cache=True)
 def known_positions(
     nodes: FloatArray,
+    arrived: FloatArray,
     position: FloatArray,
     velocity: FloatArray,
     measured: Flags,
@@ -38,7 +41,8 @@ def known_positions(
     """Return whether each group of times is covered (k,), positions and velocities (n, 3).
 
     Args:
-        nodes, position, velocity, measured, hermite: stamps, and what `frames.pose.PoseTrack` holds of them.
+        nodes, arrived: stamps and when each had arrived (s), both ascending.
+        position, velocity, measured, hermite: what `frames.pose.PoseTrack` holds of them.
         limits: longest gap, farthest extrapolation (s).
         window: to either side over which a velocity that was not measured is fitted (s), from known stamps.
         t: (n,) times (s); those of group i are `first[i]` to `first[i + 1]`, and until `known[i]` stamps are known.
@@ -47,15 +51,15 @@ def known_positions(
     p, v = np.zeros((len(t), 3)), np.zeros((len(t), 3))
     for i in range(len(known)):
         times = t[first[i] : first[i + 1]]
-        n = stamps_for(times, nodes, known[i], limits)
+        n = stamps_for(times, nodes, arrived, known[i], limits)
         good[i] = n > 0
         if n == 0 or len(times) == 0:
             continue
         base = max(segment(nodes[:n], times.min()) - 1, 0)
-        recent = np.searchsorted(nodes, known[i] - window)
+        recent = np.searchsorted(nodes, nodes[n - 1] - window)  # a fit there would use stamps still to come
         fitted = velocity[base:n]
         if n < len(nodes) and not measured[recent:n].all():
-            start = np.searchsorted(nodes, known[i] - 3.0 * window)
+            start = max(min(np.searchsorted(nodes, nodes[n - 1] - 3.0 * window), recent - 1), 0)
             begin = max(recent, base)
             slope = slopes(nodes[start:n], position[start:n], window, begin - start)
             fitted = fitted.copy()
@@ -71,6 +75,7 @@ def known_positions(
 @njit(cache=True)
 def known_attitudes(
     nodes: FloatArray,
+    arrived: FloatArray,
     quaternion: FloatArray,
     steps: FloatArray,
     limits: tuple[float, float],
@@ -86,7 +91,7 @@ def known_attitudes(
     R, rate = np.zeros((len(t), 3, 3)), np.zeros((len(t), 3))
     for i in range(len(known)):
         times = t[first[i] : first[i + 1]]
-        n = stamps_for(times, nodes, known[i], limits)
+        n = stamps_for(times, nodes, arrived, known[i], limits)
         good[i] = n > 0
         if n == 0 or len(times) == 0:
             continue

@@ -13,6 +13,7 @@ from boresight.kernels.tracker import IntArray, Look, SensorTable
 from boresight.types.sensor import FloatArray
 
 NO_SENSOR = -1  # an arrival without a look: time has gone on
+NO_LOOK = -2  # no arrival either: only the rows due until then are wanted
 PER_LOOK = ("t", "arrival", "sensor", "number")  # fields of `Looks`, and what one place in each stands for
 PER_DETECTION = ("dt", "z", "R", "row", "address")
 PER_POSE = ("position", "velocity", "axes")
@@ -99,10 +100,10 @@ def no_looks() -> Looks:
     )  # fmt: skip
 
 
-def moment(t_recv: float) -> Looks:
-    """Return an arrival (s) without a look."""
+def moment(t_recv: float, sensor: int = NO_SENSOR) -> Looks:
+    """Return a time (s) without a look: of an arrival (`NO_SENSOR`), or at which rows are wanted (`NO_LOOK`)."""
     return no_looks()._replace(
-        t=np.full(1, np.nan), arrival=np.full(1, t_recv), sensor=np.full(1, NO_SENSOR), number=np.zeros(1, np.int64),
+        t=np.full(1, np.nan), arrival=np.full(1, t_recv), sensor=np.full(1, sensor), number=np.zeros(1, np.int64),
         first=np.zeros(2, np.int64), position=np.zeros((1, 3)), velocity=np.zeros((1, 3)), axes=np.zeros((1, 3, 3)),
     )  # fmt: skip
 

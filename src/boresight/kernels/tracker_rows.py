@@ -110,13 +110,25 @@ def next_expected(clock: Clock, period: FloatArray) -> float:
     return soonest
 
 
+@njit(**BARE)
+def shown_until(tr: Tracks, s: Settings) -> float:
+    """Return the time (s) after which no track can be probable enough to be shown, if nothing comes in."""
+    if s.hide_below <= 0.0:
+        return math.inf
+    until: float = tr.time[0] - s.survival_time * math.log(s.hide_below)
+    return until
+
+
 @njit(**KERNEL)
-def times_due(clock: Clock, period: FloatArray, t_recv: float) -> int:
-    """Return at how many times rows may be due for the newest arrival and from then until `t_recv` (s): not fewer."""
+def times_due(tr: Tracks, s: Settings, clock: Clock, period: FloatArray, t_recv: float) -> int:
+    """Return at how many times rows may be due for the newest arrival and from then until `t_recv` (s): not fewer.
+
+    However long nothing comes in, there are none once no track can be shown any more.
+    """
     now = clock.now[ARRIVAL]
     until = next_expected(clock, period)
     ahead = min((until - now) / QUIET_INTERVAL, 1.0 * MOST_AHEAD) if until < math.inf else 0.0
-    late = (t_recv - now) / QUIET_INTERVAL if t_recv < math.inf else 0.0
+    late = (min(t_recv, shown_until(tr, s)) - now) / QUIET_INTERVAL if t_recv < math.inf else 0.0
     return int(ahead + max(late, 0.0)) + 4
 
 
@@ -162,7 +174,11 @@ def rows_before(
     models: Models | None,
 ) -> None:
     """Add the rows that are missing since the last one, the next arrival having been late."""
+    until = shown_until(tr, s)
     while clock.now[EMITTED] > -math.inf and clock.now[EMITTED] + LONGEST_GAP < t_recv:
+        if clock.now[EMITTED] > until:
+            clock.now[EMITTED] = t_recv - LONGEST_GAP
+            break
         clock.now[EMITTED] += QUIET_INTERVAL
         add_rows(tr, s, clock.now[EMITTED], clock.now[EMITTED], coast_after, rows, models)
 

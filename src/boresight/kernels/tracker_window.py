@@ -15,7 +15,7 @@ from numba import njit
 from boresight.kernels.options import BARE, KERNEL
 from boresight.kernels.tracker import Extras, IntArray, Models, SensorTable, Settings, Tracks
 from boresight.kernels.tracker_copies import Copies, keep, restore
-from boresight.kernels.tracker_looks import NO_SENSOR, Looks, look_at, sensor_at
+from boresight.kernels.tracker_looks import NO_LOOK, NO_SENSOR, Looks, look_at, sensor_at
 from boresight.kernels.tracker_rows import (
     ARRIVAL,
     PENDING,
@@ -92,12 +92,17 @@ def advance(
         at = n
         while at > 0 and looks.t[order[at - 1]] > t:
             at -= 1
-        due = clock.now[PENDING] != 0.0 and t_recv > clock.now[ARRIVAL]
-        if not _has_room(tr, copies, looks, queue, k, at, times_due(clock, period, t_recv) if due else 0, rows):
+        later = t_recv > clock.now[ARRIVAL] > -math.inf
+        if not _has_room(
+            tr, copies, looks, queue, k, at, times_due(tr, s, clock, period, t_recv) if later else 0, rows
+        ):
             return k
-        if due:
-            rows_at_arrival(tr, s, clock, period, coast_after, rows, models)
+        if later:
+            if clock.now[PENDING] != 0.0:
+                rows_at_arrival(tr, s, clock, period, coast_after, rows, models)
             rows_before(tr, s, clock, t_recv, coast_after, rows, models)
+        if looks.sensor[k] == NO_LOOK:
+            continue
         if looks.sensor[k] == NO_SENSOR:
             if t_recv > clock.now[ARRIVAL] > -math.inf:
                 clock.now[ARRIVAL], clock.now[PENDING] = t_recv, 1.0

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -15,12 +15,15 @@ from boresight.frames.array_face import Pole, enu_from_face
 from boresight.frames.azel import azel_from_enu
 from boresight.frames.local import ecef_from_enu, ecef_from_enu_rotation
 from boresight.frames.tangent import direction_from_tangent
-from boresight.kernels.guide import TRACK
+from boresight.kernels.guide import EQUATOR, TRACK
 from boresight.kernels.guide_run import ACCEPTED, C_BEST
 from boresight.pointing.beam import Aim, aim_at
-from boresight.pointing.guide import EYE, NONE, THINNED, GuideFilter, GuideState
+from boresight.pointing.guide import EYE, NONE, THINNED, GuideSource, Predicted
+from boresight.pointing.mount import Mask, horizon_at
 from boresight.types import Site
 from boresight.types.sensor import FloatArray
+
+NEAR = 20e3  # m: what is nearer is in sight, unless the mount's own horizon says otherwise
 
 
 class Mode(StrEnum):
@@ -30,6 +33,7 @@ class Mode(StrEnum):
     OWN = "own"  # own tracking alone: no guide is fresh
     COAST = "coast"  # nobody is fresh: the prediction goes on, its covariance grows
     SEARCH = "search"  # the covariance has outgrown the beam: a spiral about the prediction
+    BELOW_HORIZON = "below_horizon"  # the target stands below the horizon: the beam waits where it is, nobody searches
     NO_ATTITUDE = "no_attitude"  # the platform's navigation is too old: face and mount angles are not known
 
 
@@ -52,16 +56,51 @@ class Pointing(NamedTuple):
     mount_elevation: float
 
 
+class Guide(Protocol):
+    """Where the target is: a `GuideFilter` of reports, or a track of the tracker (`follow.TrackGuide`)."""
+
+    @property
+    def sources(self) -> tuple[GuideSource, ...]:
+        """Who reports."""
+        ...
+
+    @property
+    def orbit(self) -> bool:
+        """Whether the target flies on an orbit."""
+        ...
+
+    def init(self) -> Any:
+        """Return the state before the first report."""
+        ...
+
+    def step(self, state: Any, source: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray) -> int:
+        """Take in one report; returns its fate."""
+        ...
+
+    def surprise(self, state: Any, source: int, t: float, z: FloatArray, origin: FloatArray, axes: FloatArray) -> float:
+        """Return how far a report lies from the prediction."""
+        ...
+
+    def predict(self, state: Any, t: float) -> Predicted | None:
+        """Return the target at time `t` (s)."""
+        ...
+
+    def restart_now(self, state: Any) -> None:
+        """Forget the target."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Pointer:
     """Configuration of the chain.
 
     `own` (s,) says which sources are own tracking. A source is fresh until `stale` (s) after its last report; going
     back from own tracking or coasting to the guides takes `settle` (s) of fresh reports: hysteresis. `search_below`
-    is the probability in the beam below which the beam begins to search while nobody is fresh.
+    is the probability in the beam below which the beam begins to search while nobody is fresh. `horizon`: corners
+    (azimuth, elevation) (rad) in the axes the mount stands on.
     """
 
-    guide: GuideFilter
+    guide: Guide
     site: Site
     own: tuple[bool, ...]
     face: tuple[float, float, float] = (0.0, 0.5 * math.pi, 0.0)  # boresight azimuth, elevation, skew (rad)
@@ -72,6 +111,7 @@ class Pointer:
     stale: float = 3.0
     settle: float = 2.0
     search_below: float = 0.5
+    horizon: Mask = ()  # of what stands in the way; without it the Earth itself, from 0° on
 
     def __post_init__(self) -> None:
         if len(self.own) != len(self.guide.sources):
@@ -98,7 +138,10 @@ class Pointer:
         origin: FloatArray = NONE,
         axes: FloatArray = EYE,
     ) -> int:
-        """Take in one report in the state's own arrays; returns its fate (`kernels.guide_run`), -1 if not allowed."""
+        """Take in one report in the state's own arrays; returns its fate (`kernels.guide_run`), -1 if not allowed.
+
+        Of a direction any of azimuth, elevation and range may be NaN: not measured (see `GuideFilter.step`).
+        """
         if not self.allowed(source):
             return -1
         fate = self.guide.step(state.guide, source, t, z, origin, axes)
@@ -135,7 +178,7 @@ class Pointer:
         except UserError:
             self.guide.restart_now(state.guide)
             return state, None
-        mode = self._mode(state, t, aim)
+        mode = Mode.BELOW_HORIZON if self._below(state, t, aim, place) else self._mode(state, t, aim)
         if mode == Mode.SEARCH:
             begun = state.search_begun if state.mode == Mode.SEARCH else t
             n = state.searched + 1 if state.mode == Mode.SEARCH else 0
@@ -181,13 +224,27 @@ class Pointer:
         By the learned variance of each source; none for one that is not fresh or is held to be biased.
         """
         sources = self.guide.sources
-        angle = np.array([s.sigma_angle * out.aim.distance for s in sources])
+        angle = np.array([s.sigma_across * out.aim.distance for s in sources])
         sigma = np.where(angle > 0.0, angle, [s.sigma_position for s in sources])
         sigma = np.where(sigma > 0.0, sigma, state.spread)
         fresh = out.t - state.last <= self.stale
         biased = np.arange(1, len(sources) + 1) == int(state.guide.clock[C_BEST])
-        share = np.where(fresh & ~biased, 1.0 / (state.guide.scale * sigma**2), 0.0)
+        says = fresh & ~biased & (sigma > 0.0)  # a range alone says nothing across the line of sight
+        share = np.where(says, 1.0 / (state.guide.scale * np.where(says, sigma, 1.0) ** 2), 0.0)
         return share / max(float(share.sum()), 1e-300)
+
+    def _below(self, state: PointerState, t: float, aim: Aim, place: Place | None) -> bool:
+        """Return whether the target stands below the horizon; what own tracking sees does not."""
+        if any(own and t - last <= self.stale for own, last in zip(self.own, state.last.tolist(), strict=True)):
+            return False
+        azimuth, elevation = aim.azimuth, aim.elevation
+        if not self.horizon:  # what is nearer than the point where the line of sight meets the level stands before it
+            meets = (EQUATOR + self.site.height) * math.sin(-elevation)
+            return elevation < 0.0 and aim.distance > max(meets, NEAR)
+        if place is not None and not math.isnan(place.enu_from_mount[0, 0]):
+            on_board = (float(v) for v in unit_of(azimuth, elevation) @ place.enu_from_mount)
+            azimuth, elevation, _ = azel_from_enu(*on_board)
+        return elevation < float(horizon_at(self.horizon, azimuth))
 
     def _mode(self, state: PointerState, t: float, aim: Aim) -> Mode:
         fresh = [t - last <= self.stale for last in state.last.tolist()]
@@ -223,7 +280,7 @@ class PointerState(NamedTuple):
     axis, of the last track of a source of tracks.
     """
 
-    guide: GuideState
+    guide: Any  # of its `Guide`
     last: FloatArray
     since: FloatArray
     spread: FloatArray

@@ -32,7 +32,7 @@ def observed_of(
     d = recording.detections
     latency = np.array([s.latency for s in recording.sensors])
     t = d.t - latency[d.sensor]
-    good = (track_id != NO_TRACK) & np.isin(d.sensor, sorted(use)) & np.isfinite(d.z).any(axis=1)
+    good = (track_id != NO_TRACK) & np.isin(d.sensor, sorted(use)) & np.isfinite(d.z).any(axis=1) & recording.usable
     by_sensor = tuple(poses.get(s.platform) if s.platform is not None else None for s in recording.sensors)
     for i, pose in enumerate(by_sensor):
         mine = good & (d.sensor == i)

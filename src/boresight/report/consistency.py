@@ -48,7 +48,7 @@ def nis_of(recording: Recording, decisions: DecisionRows, first: float, last: fl
 
 def nees_of(score: Score, dimensions: int, first: float, last: float) -> dict[str, Any]:
     """Return the binned normalised errors of all targets."""
-    t = np.array([v for target in score.targets for v in target.times])
+    t = np.array([v for target in score.targets for v in target.nees_times])
     nees = np.array([v for target in score.targets for v in target.nees])
     return binned(t, nees, np.full(len(t), dimensions), first, last)
 

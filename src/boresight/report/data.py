@@ -46,6 +46,7 @@ def collect(results: Results, recording: Recording | None) -> dict[str, Any]:
     data["track_rows"] = len(results.tracks)
     if results.registration is not None:
         data["registration"] = _registration(results.registration, first)
+    data["notes"] = list(recording.notes) if recording is not None else summary.get("notes", [])
     data["outcome"] = _outcome(results.decisions, recording)
     if recording is not None:
         data |= _recorded(recording, results, first, last)
@@ -54,7 +55,9 @@ def collect(results: Results, recording: Recording | None) -> dict[str, Any]:
 
 
 def _span(results: Results, recording: Recording | None) -> tuple[float, float]:
-    t = recording.detections.t if recording is not None else results.tracks.t
+    if recording is not None:
+        return recording.span
+    t = results.tracks.t
     return (float(t.min()), float(t.max())) if len(t) else (0.0, 1.0)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import re
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,5 @@ def render(data: dict[str, Any]) -> str:
     embedded = text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
     title = html.escape(f"{data['name']} – boresight report")
     parts = {"@@TITLE@@": title, "@@STYLE@@": style, "@@SCRIPT@@": script, "@@DATA@@": embedded}
-    for mark, value in parts.items():
-        before, _, after = page.partition(mark)
-        page = before + value + after
-    return page
+    # one pass, so that no name that looks like a mark is taken for one
+    return re.sub("|".join(parts), lambda found: parts[found[0]], page)

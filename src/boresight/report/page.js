@@ -144,7 +144,7 @@ $("about").textContent = `${D.dimensions}-D, ${sig(span, 4)} s` + (sensors.lengt
 const scores = D.scores || [], own = scores.find(r => r.item === "tracks"), none = scores.find(r => r.item === "empty tracker");
 const counts = D.summary.counts || {};
 const tiles = [[String(D.tracks.length), "tracks"], [String(counts.reports ?? D.outcome.reduce((a, r) => a + r.rows, 0)), "reports"]];
-if (own) tiles.push([sig(own.gospa_rms_m, 3) + " m", `GOSPA RMS, cut off at 20 m (empty tracker ${sig(none.gospa_rms_m, 3)})`],
+if (own) tiles.push([sig(own.gospa_rms_m, 3) + " m", `GOSPA RMS, cut off at ${sig(own.cut_off_m, 3)} m (empty tracker ${sig(none.gospa_rms_m, 3)})`],
   [own.tracked_fraction === null ? "–" : sig(100 * own.tracked_fraction, 3) + " %", "of the time tracked"], [sig(own.position_rmse_m, 3) + (own.position_rmse_m === null ? "" : " m"), "position RMSE"],
   [sig(own.false_track_s, 3) + " s", "of false tracks"], [sig(own.nees_mean, 3), `NEES (${D.dimensions} is right)`]);
 for (const [v, w] of tiles) $("tiles").append(make("div", {class: "tile"}, make("b", {}, v), make("span", {}, w)));
@@ -321,6 +321,7 @@ if (D.dimensions === 3 && high.length) {
   chart($("height"), {series: by("t", "z", v => v / T), yl: "up, m", x: [0, span], gap: 5, height: 220});
   chart($("side-e"), {series: by("x", "z", v => v / L).map(s => ({...s, label: ""})), yl: "up, m", xl: "east, m", title: "Seen from the south"});
   chart($("side-n"), {series: by("y", "z", v => v / L).map(s => ({...s, label: ""})), yl: "up, m", xl: "north, m", title: "Seen from the west"});
+  $("height").append(make("p", {class: "note"}, `Up is above the horizontal plane through the site, which lies ${sig(D.summary.recording?.site?.height_m ?? 0, 5)} m above the WGS84 ellipsoid (not above mean sea level).`));
   $("height").append(key([["#111", "truth (dashed)", true], ["#2a7f9e", "tracks (a colour each)", true]]));
 } else hide("height-section");
 
@@ -333,7 +334,7 @@ if (own) {
   const details = make("details", targets.length <= 12 ? {open: ""} : {}, make("summary", {}, `by target (${targets.length})`));
   details.append(table([["target", "target", true], ["tracked_fraction", "tracked"], ["position_rmse_m", "RMSE, m"], ["identity_switches", "switches"], ["breaks", "breaks"], ["track_ids", "tracks that held it"], ["nees_mean", "NEES mean"], ["nees_in_band_95", "NEES in 95 %"]], targets));
   $("scores").append(details);
-  chart($("gospa"), {title: "GOSPA against time (20 m is what one miss and one false track cost together)", series: [{x: D.gospa.t.map(v => v / T), y: D.gospa.v.map(v => v / 100), colour: "#0b6aa2", label: "GOSPA, m"}], x: [0, span], y: [0, null], yl: "m", height: 170});
+  chart($("gospa"), {title: "GOSPA against time (the cut-off is what one miss and one false track cost together)", series: [{x: D.gospa.t.map(v => v / T), y: D.gospa.v.map(v => v / 100), colour: "#0b6aa2", label: "GOSPA, m"}], x: [0, span], y: [0, null], yl: "m", height: 170});
   const axes = ["east", "north", "up"];
   const paint = list => {
     $("errors").replaceChildren();
@@ -441,6 +442,8 @@ if (own) {
   const wide = names.map(n => { const r = {sensor: n}; let all = 0; for (const o of D.outcome) if (o.sensor === n) { r[o.fate] = (r[o.fate] || 0) + o.rows; all += o.rows; } seen.forEach(f => r[f] ??= 0); r.all = all; return r; });
   $("fates").append(table([["sensor", "sensor", true], ["all", "reports"], ...seen.map(f => [f, f.replaceAll("_", " ")])], wide));
   const why = D.outcome.filter(r => r.reason);
+  for (const r of D.summary.lost || []) $("fates").append(make("p", {class: "note"}, `${r.sensor}: ${r.reports} of ${r.of} reports not used (${r.fate.replaceAll("_", " ")}): ${r.reason}`));
+  for (const line of D.notes || []) $("fates").append(make("p", {class: "note"}, line));
   if (why.length) $("fates").append(make("details", {}, make("summary", {}, "reasons"), table([["sensor", "sensor", true], ["fate", "fate", true], ["reason", "reason", true], ["rows", "reports"]], why)));
 })();
 

@@ -27,7 +27,7 @@ def places_of(recording: Recording, sensor: int) -> Places:
     d, declared = recording.detections, recording.sensors[sensor]
     z = np.nan_to_num(d.z)
     seen = ~np.isnan(d.z[:, [Component.AZIMUTH, Component.EAST]]).all(axis=1)
-    row = np.flatnonzero((d.sensor == sensor) & seen)
+    row = np.flatnonzero((d.sensor == sensor) & seen & recording.usable)
     t = d.t[row] - declared.latency
     platform = next((p for p in recording.platforms if p.id == declared.platform), None)
     try:

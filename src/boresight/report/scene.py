@@ -47,7 +47,7 @@ class Scene:
 
     def __init__(self, results: Results, recording: Recording | None, trail: float | None = None) -> None:
         rows = results.tracks
-        stamps = recording.detections.t if recording is not None else rows.t
+        stamps = recording.detections.t[recording.usable] if recording is not None else rows.t
         self.start, self.end = (float(stamps.min()), float(stamps.max())) if len(stamps) else (0.0, 0.0)
         self.trail = max(10.0, (self.end - self.start) / 8.0) if trail is None else trail
         self.sensors = [s.id for s in recording.sensors] if recording is not None else []

@@ -1,32 +1,54 @@
-"""The live loop: what arrives goes in at once, a command goes out at every tick."""
+"""`boresight point`, live: reports of all inputs in, a command at every tick out; and the same from its log."""
 
 from __future__ import annotations
 
 import math
-import select
-import socket
 import time
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TextIO
 
-import msgspec
 import numpy as np
 
 from boresight.config.site import Station
+from boresight.engine.guide import GuideOutput, Guiding
+from boresight.engine.loop import run
 from boresight.errors import UserError
+from boresight.io.livelog import LogReader, LogWriter
 from boresight.kernels.guide import DIRECTION
-from boresight.pointing.pointer import Mode, Pointer, PointerState, Pointing
+from boresight.pointing.pointer import Pointer, PointerState, Pointing
+from boresight.service.clock import Clock
+from boresight.service.commands import Commands, status_line
 from boresight.service.elements import Elements
-from boresight.service.feed import PER_READ, Feed, Stand
+from boresight.service.feed import Feed, Stand
 from boresight.service.navigation import Navigation
-from boresight.service.rotctld import SPACING, Rotator
-from boresight.service.sockets import Broadcast, Input, Serial, Tcp, Udp, address
+from boresight.service.sockets import Input, Serial, Tcp, Udp
+from boresight.service.source import LiveSource, LogSource
 from boresight.types import Axes
 
-POLL = 0.005  # s between looks at inputs that cannot be waited for
-FURTHEST = 120.0  # s that a pass is looked ahead
 SHOW = 0.1  # s between status lines
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """What a site file makes of lines: the decoder and the estimator, with the navigation that both use."""
+
+    feed: Feed
+    guiding: Guiding
+    carrier: Navigation | None
+    elements: Elements
+
+
+def chain_for(station: Station, pointer: Pointer) -> Chain:
+    """Return the decoder and estimator of a station, before the first line."""
+    file = station.file
+    stands = {s.id: Stand(Axes(s.axes), s.offset_enu_m, s.lever_arm_frd_m, s.latency_s) for s in file.source}
+    carrier = None if file.platform is None else Navigation(file.platform, pointer, file.attitude_coast_s)
+    elements = Elements(pointer, station.elements, {s.id: s.max_age_days for s in file.source})
+    place = None if carrier is None else carrier.place
+    guiding = Guiding(pointer, file.beam.rate_hz, place, elements.report)
+    return Chain(Feed(pointer, stands, carrier), guiding, carrier, elements)
 
 
 def run_live(
@@ -34,154 +56,139 @@ def run_live(
     pointer: Pointer,
     duration: float | None,
     status: TextIO | None,
-    clock: Callable[[], float] = time.time,
+    clock: Callable[[], float] | None = None,
     stop: Callable[[], bool] = lambda: False,
+    log: LogWriter | None = None,
+    ready: Callable[[list[Input]], None] = lambda _: None,
 ) -> dict[str, Any]:
     """Point until `duration` (s) has passed, `stop` says so or the user interrupts; returns the counts.
 
-    Raises UserError if the site file names no input, or one that cannot be opened.
+    `ready` is called with the inputs once kernels are loaded and sockets are open. Raises UserError if the site file
+    names no input, or one that cannot be opened.
     """
-    file = station.file
-    inputs = _inputs(station)
-    stands = {s.id: Stand(Axes(s.axes), s.offset_enu_m, s.lever_arm_frd_m) for s in file.source}
-    carrier = None if file.platform is None else Navigation(file.platform, pointer, file.attitude_coast_s)
-    feed = Feed(pointer, stands, carrier)
-    out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM) if file.output.udp else None
-    goal = address(file.output.udp, "output.udp") if file.output.udp else ("", 0)
-    stream = Broadcast(file.output.tcp) if file.output.tcp else None
-    rotator = _rotator(station)
-    # half a turn: more is never to be made good
-    ahead = np.arange(0.0, min(math.pi / station.mount.azimuth_rate, FURTHEST) + SPACING, SPACING)
-    elements = Elements(pointer, station.elements)
-    state, begun = _warm(pointer), clock()
-    tick, ticks, latency, total, answers, busy = begun, 0, 0.0, 0.0, 0, time.process_time()
-    arrived, shown = math.nan, -math.inf
+    clock = clock if clock is not None else Clock()
+    inputs = inputs_of(station)
+    chain = chain_for(station, pointer)
+    if not inputs and not chain.elements.usable(clock()):
+        raise UserError(f"no [input], and no elements to guide: {chain.elements.told(clock())}: see max_age_days")
+    commands = Commands(station.file.output, station.mount, pointer, clock, chain.carrier)
+    watch = _Watch(chain, commands, clock, status)
+    source = LiveSource(
+        inputs, [chain.feed] * len(inputs), clock, station.file.beam.rate_hz, log, duration=duration, stop=stop,
+        housekeeping=watch.show,
+    )  # fmt: skip
+    watch.source = source
+    warm(pointer)
+    ready(inputs)
+    busy = time.process_time()
     try:
-        while not stop() and (duration is None or clock() - begun < duration):
-            now = clock()
-            for source in inputs:
-                for data in source.read():
-                    for report in feed.parse(data, now):
-                        pointer.take(state, *report)
-                        arrived = now
-            if now < tick:
-                _wait(inputs, tick - now)
-                continue
-            elements.report(state, now)
-            state, pointing = pointer.tick(state, now, None if carrier is None else carrier.place(now))
-            if pointing is not None:
-                if out is not None:
-                    out.sendto(encode(pointing), goal)
-                if stream is not None:
-                    stream.send(encode(pointing))
-                if rotator is not None:
-                    path = partial(pointer.path, state, now, ahead) if steady(carrier, pointing) else None
-                    rotator.follow(pointing.mount_azimuth, pointing.mount_elevation, now, path)
-                if not math.isnan(arrived):
-                    took = clock() - arrived if ticks else 0.0
-                    latency, total, answers = max(latency, took), total + took, answers + (ticks > 0)
-                ticks += 1
-                arrived = math.nan
-            if status is not None and pointing is not None and now >= shown + SHOW:
-                shown = now
-                status.write("\r" + status_line(pointer, state, pointing, rotator, carrier))
-                status.flush()
-            tick = max(tick + 1.0 / file.beam.rate_hz, now)
+        run(source, chain.guiding, [watch])
     except KeyboardInterrupt:
         pass
     finally:
-        for source in inputs:
-            feed.counts["overflow"] += source.overflow()
-            source.close()
-        if out is not None:
-            out.close()
-        if stream is not None:
-            stream.close()
-        if rotator is not None:
-            rotator.close()
+        lost = source.lost()
+        for one in inputs:
+            one.close()
+        commands.close()
+        if log is not None:
+            log.close(clock())
         if status is not None:
             status.write("\n")
-    spent, wall = time.process_time() - busy, max(clock() - begun, 1e-9)
-    told = {"latency_mean_s": total / max(answers, 1), "latency_max_s": latency, "core_share": spent / wall}
-    found: dict[str, Any] = {
-        "ticks": ticks,
-        **told,
-        **feed.counts,
+    wall = max(clock() - source.begun, 1e-9)
+    return {
+        **watch.counts(),
+        "core_share": (time.process_time() - busy) / wall,
+        **chain.feed.counts,
+        **chain.elements.counts,
+        "elements": dict(chain.elements.faults),
+        "overflow": sum(sum(one.values()) for one in lost.values()),
+        "lost": lost,
+        "sources": {name: h.words() for name, h in chain.feed.health.items() if h.words()},
+        **({"log_lost_records": log.lost, "log_errors": log.errors} if log is not None else {}),
     }
-    return found | ({f"rotator_{k}": v for k, v in rotator.counts.items()} if rotator else {})
 
 
-def _rotator(station: Station) -> Rotator | None:
-    out = station.file.output
-    if not out.rotctld:
-        return None
-    return Rotator(out.rotctld, station.mount, math.radians(out.dead_band_deg), 1.0 / out.command_rate_hz)
+def replay_log(station: Station, pointer: Pointer, reader: LogReader) -> Iterator[tuple[Pointing, PointerState]]:
+    """Yield every command of a live run, from its log: the same bits."""
+    chain = chain_for(station, pointer)
+    source = LogSource(reader, [chain.feed] * 64)
+    state = chain.guiding.init()
+    for items in source:
+        state, out = chain.guiding.step(state, items)
+        for pointing in out.pointings:
+            yield pointing, out.state
 
 
-def steady(carrier: Navigation | None, p: Pointing) -> bool:
-    """Return whether the mount's way can be foretold: it stands on the ground and does not search."""
-    return carrier is None and p.mode in (Mode.FUSED, Mode.OWN, Mode.COAST)
+class _Watch:
+    """A sink that sends commands on and notes how long they took after what they answer."""
+
+    def __init__(self, chain: Chain, commands: Commands, clock: Callable[[], float], status: TextIO | None) -> None:
+        self.chain, self.commands, self.clock, self.status = chain, commands, clock, status
+        self.source: LiveSource | None = None
+        self.waits = math.nan  # s, arrival of the oldest report that no command has answered
+        self.longest = self.total = 0.0
+        self.answers, self.shown = 0, -math.inf
+
+    def take(self, output: GuideOutput) -> None:
+        """Send the commands of one step."""
+        if math.isnan(self.waits) and self.source is not None:
+            self.waits = self.source.arrived
+        first = self.commands.ticks == 0
+        self.commands.take(output)
+        if output.pointings:
+            if not math.isnan(self.waits) and not first:
+                took = self.clock() - self.waits
+                self.longest, self.total, self.answers = max(self.longest, took), self.total + took, self.answers + 1
+            self.waits = math.nan
+
+    def show(self, now: float) -> None:
+        """Write the status line, ten times a second at most; say when the wall clock has stepped."""
+        words = self.clock.stepped() if isinstance(self.clock, Clock) else ""
+        if self.status is None:
+            return
+        if words:
+            self.status.write(f"\nboresight: {words}\n")
+        last, state = self.commands.last, self.commands.state
+        if last is None or state is None or now < self.shown + SHOW:
+            return
+        self.shown = now
+        line = status_line(self.chain.guiding.pointer, state, last, self.commands.rotator, self.chain.carrier)
+        clocks = "  ".join(f"{name}: {h.words()}" for name, h in self.chain.feed.health.items() if h.words())
+        failing = "  ".join(f"{out.name}: {out.error}" for out in self.commands.outs if out.error)
+        self.status.write("\r" + "  ".join(filter(None, (line, clocks, self.chain.elements.told(now), failing))))
+        self.status.flush()
+
+    def counts(self) -> dict[str, Any]:
+        """Return ticks, latencies (s) and what the outputs did."""
+        found = self.commands.counts()
+        return {**found, "latency_mean_s": self.total / max(self.answers, 1), "latency_max_s": self.longest}
 
 
-def encode(p: Pointing) -> bytes:
-    """Return a command as one JSON line."""
-    a = p.aim
-    degrees = {
-        "az_deg": a.azimuth, "el_deg": a.elevation, "face_az_deg": a.face_azimuth, "face_el_deg": a.face_elevation,
-        "az_rate_deg_s": a.azimuth_rate, "el_rate_deg_s": a.elevation_rate, "sigma_deg": a.sigma,
-        "mount_az_deg": p.mount_azimuth, "mount_el_deg": p.mount_elevation,
-    }  # fmt: skip
-    row = {"t_s": p.t, "t_aim_s": p.t_aim, **{k: math.degrees(v) for k, v in degrees.items()}}
-    row |= {"face_u": a.cosine_right, "face_v": a.cosine_up}
-    return msgspec.json.encode({**row, "p_in_beam": a.p_in_beam, "mode": str(p.mode)}) + b"\n"
-
-
-def status_line(
-    pointer: Pointer, state: PointerState, p: Pointing, rotator: Rotator | None, carrier: Navigation | None = None
-) -> str:
-    """Return the line that says how it goes: mode, aim, error, each source's age, weight and learned sigma factor."""
-    ages, weights = pointer.ages(state, p.t), pointer.weights(state, p)
-    rows = zip(pointer.guide.sources, ages, weights, state.guide.scale, strict=True)
-    sources = "  ".join(
-        f"{s.id} {'–' if math.isinf(age) else f'{age:.1f}s'} {100.0 * weight:.0f}% ×{math.sqrt(scale):.2f}"
-        for s, age, weight, scale in rows
-    )
-    best = int(state.guide.clock[3])
-    biased = f"  {pointer.guide.sources[best - 1].id} is biased" if best else ""
-    where = "" if rotator is None else ("  rotator away" if rotator.position is None else "  rotator on")
-    aim = f"az {math.degrees(p.aim.azimuth):8.3f} el {math.degrees(p.aim.elevation):7.3f}"
-    error = f"σ {math.degrees(p.aim.sigma):.3f}° P {p.aim.p_in_beam:.2f}"
-    turned = "" if carrier is None else f"  {carrier.name} {carrier.age(p.t):.1f}s"
-    return f"{p.mode:6s} {aim} {error}  {sources}{turned}{biased}{where}   "
-
-
-def _inputs(station: Station) -> list[Input]:
+def inputs_of(station: Station) -> list[Input]:
+    """Return the inputs of a site file, open; raises UserError."""
     wanted = station.file.input
     inputs: list[Input] = []
     if wanted.udp:
-        inputs.append(Udp(wanted.udp, PER_READ))
+        inputs.append(Udp(wanted.udp))
     if wanted.tcp:
-        inputs.append(Tcp(wanted.tcp, PER_READ))
+        inputs.append(Tcp(wanted.tcp))
     if wanted.serial:
-        inputs.append(Serial(wanted.serial, wanted.baud, PER_READ))
+        inputs.append(Serial(wanted.serial, wanted.baud))
     if not inputs and not station.elements:
         raise UserError("the site file has no [input]: give udp, tcp or serial, or use --replay")
     return inputs
 
 
-def _wait(inputs: list[Input], longest: float) -> None:
-    """Sleep until something arrives or `longest` (s) has passed."""
-    files = [f for source in inputs for f in source.files()]
-    asked = any(not source.files() for source in inputs)
-    select.select(files, [], [], min(longest, POLL) if asked else longest)
-
-
-def _warm(pointer: Pointer) -> PointerState:
-    """Compile the kernels before the first report, on a filter that is thrown away."""
+def warm(pointer: Pointer) -> None:
+    """Load (or compile) the kernels before the first report, on a filter that is thrown away."""
     scratch = pointer.init()
     here = np.array([7e6, 0.0, 0.0])
     for source, s in enumerate(pointer.guide.sources):
         z = np.array([0.1, 0.2, 1e5]) if s.kind == DIRECTION else here
         pointer.take(scratch, source, 0.0, z, 0.9 * here, np.eye(3))
         pointer.tick(scratch, 0.5)
-    return pointer.init()
+
+
+def log_of(folder: Path) -> LogReader:
+    """Return the reader of a log."""
+    return LogReader(folder)

@@ -10,6 +10,7 @@ import numpy as np
 from boresight.frames.array_face import enu_from_face
 from boresight.frames.local import ecef_from_enu
 from boresight.frames.pose import PoseTrack, pose_track
+from boresight.io.jsonlines import Fix
 from boresight.pointing.pointer import Place, Pointer
 from boresight.types import FloatArray, PlatformTrack
 
@@ -49,12 +50,12 @@ class Navigation:
         self.rows: deque[tuple[float, FloatArray]] = deque(maxlen=MOST)
         self._track: PoseTrack | None = None
 
-    def take(self, t: float, row: FloatArray) -> bool:
-        """Keep a stamp at `t` (s): `row` (9,) of `lines.navigation`; false if it is not later than the last."""
-        if self.rows and not t > self.rows[-1][0]:
+    def take(self, fix: Fix) -> bool:
+        """Keep a stamp of the platform; false, and left out, if it is not later than the last."""
+        if self.rows and not fix.t > self.rows[-1][0]:
             return False
-        self.rows.append((t, row))
-        while len(self.rows) > FEWEST and self.rows[1][0] < t - WINDOW:
+        self.rows.append((fix.t, fix.row))
+        while len(self.rows) > FEWEST and self.rows[1][0] < fix.t - WINDOW:
             self.rows.popleft()
         self._track = None
         return True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,29 +9,28 @@ from pathlib import Path
 import numpy as np
 
 from boresight.config.site import Station
+from boresight.engine.guide import Guiding
+from boresight.engine.loop import Item
+from boresight.engine.portions import in_order, ticked
 from boresight.errors import UserError, did_you_mean
-from boresight.frames.local import ecef_from_enu, ecef_from_enu_rotation
-from boresight.frames.pose import PoseTrack, pose_track, sensor_pose
+from boresight.frames.pose import PoseTrack, pose_track
 from boresight.io.scans import iter_scans
-from boresight.kernels.guide import DIRECTION
 from boresight.pointing.guide import NONE
-from boresight.pointing.pointer import Pointer, PointerState, Pointing
+from boresight.pointing.mount import MountState
+from boresight.pointing.pointer import Place, Pointer, PointerState, Pointing
+from boresight.pointing.reports import Report, reports_of_look
 from boresight.service.elements import Elements
 from boresight.service.navigation import place_at
 from boresight.service.tracks import read_track
-from boresight.types import Component, FloatArray, Recording, Scan
+from boresight.types import Recording
 
-POSITION = slice(Component.EAST, Component.UP + 1)
 APART = 3600.0  # s that a track may begin before, or end after, the recording
-
-Report = tuple[float, FloatArray, FloatArray, FloatArray]  # t, z, origin, axes as `Pointer.take` wants them
-Event = tuple[float, int, Scan | Report]  # s of arrival, source, what arrived
 
 
 def replay(
     station: Station, folder: Path, pointer: Pointer, recording: Recording
-) -> Iterator[tuple[Pointing, PointerState]]:
-    """Yield a command at every tick, from what had arrived by then; live and replay are one chain.
+) -> Iterator[tuple[Pointing, PointerState, MountState]]:
+    """Yield a command at every tick, from what had arrived by then, and where the mount has been sent.
 
     `platform` of the site file carries the antenna: its pose is foretold to the aim time from the navigation data known
     at the tick, and the face is turned with it. Tracks of other trackers (`tracks`, beside the site file in `folder`)
@@ -42,40 +40,47 @@ def replay(
     Of a look with several detections the one nearest to the prediction is taken (before there is one: the first).
     """
     rate, coast = station.file.beam.rate_hz, station.file.attitude_coast_s
-    tracks = {p.id: pose_track(p, recording.site) for p in recording.platforms}
-    carrier = _carrier(tracks, station.file.platform)
-    elements = Elements(pointer, station.elements)
-    chooser = _Chooser(station, pointer, recording, tracks)
-    state = pointer.init()
-    first, k = math.nan, 0
+    poses = {p.id: pose_track(p, recording.site) for p in recording.platforms}
+    carrier = _carrier(poses, station.file.platform)
+    elements = Elements(pointer, station.elements, {s.id: s.max_age_days for s in station.file.source})
 
-    def ticked(state: PointerState, t: float) -> tuple[PointerState, Pointing | None]:
-        place = None if carrier is None else place_at(pointer, carrier.until(t), t, coast)
-        return pointer.tick(state, t, place)
+    def place(t: float) -> Place:
+        assert carrier is not None
+        return place_at(pointer, carrier.until(t), t, coast)
 
-    tick = 0.0
-    for arrival, source, what in _events(station, folder, pointer, recording):
-        if math.isnan(first):
-            first = tick = arrival
-        while tick < arrival:
-            elements.report(state, tick)
-            state, out = ticked(state, tick)
-            if out is not None:
-                yield out, state
-            k += 1
-            tick = first + k / rate
-        report = chooser.report(state, what) if isinstance(what, Scan) else what
-        if report is not None:
-            pointer.take(state, source, *report)
-    state, out = ticked(state, tick)
-    if out is not None:
-        yield out, state
+    guiding = Guiding(pointer, rate, None if carrier is None else place, elements.report)
+    items = in_order(_looks(station, pointer, recording, poses), *_tracks(station, folder, pointer, recording))
+    state = guiding.init()
+    mount = _Sent(station)
+    for portion in ticked(items, rate):
+        state, out = guiding.step(state, portion)
+        for pointing in out.pointings:
+            yield pointing, out.state, mount.step(pointing)
 
 
-def _events(station: Station, folder: Path, pointer: Pointer, recording: Recording) -> Iterator[Event]:
-    """Yield the recording's looks and the other trackers' tracks in order of arrival."""
+def _looks(station: Station, pointer: Pointer, recording: Recording, poses: dict[str, PoseTrack]) -> Iterator[Item]:
+    """Yield the reports of every look."""
+    up = {s.id: s.sigma_up_m for s in station.file.source}
+    own = recording.detections.covariance
+    for scan in iter_scans(recording):
+        sensor, guide = recording.sensors[scan.sensor], pointer.guide.sources[scan.sensor]
+        if not len(scan.t):
+            continue
+        track = poses.get(sensor.platform) if sensor.platform is not None else None
+        given = {
+            i: scan.covariance[i] for i, row in enumerate(scan.row) if guide.correlation is not None or int(row) in own
+        }
+        reports = reports_of_look(
+            scan.sensor, guide, sensor, None if track is None else track.until(scan.t_recv), recording.site, scan.t,
+            scan.t_recv, scan.z, given, up.get(guide.id, guide.sigma_position),
+        )  # fmt: skip
+        if reports:
+            yield reports
+
+
+def _tracks(station: Station, folder: Path, pointer: Pointer, recording: Recording) -> Iterator[Iterator[Item]]:
+    """Yield the rows of each other tracker's track, as reports in the order in which it gave them."""
     index = {s.id: i for i, s in enumerate(pointer.guide.sources)}
-    streams: list[Iterator[Event]] = [((s.t_recv, s.sensor, s) for s in iter_scans(recording))]
     d = recording.detections
     for table in station.file.source:
         if table.tracks is None:
@@ -88,12 +93,7 @@ def _events(station: Station, folder: Path, pointer: Pointer, recording: Recordi
                 f"source '{table.id}': its tracks ({t[0]:.6g} … {t[-1]:.6g} s) are of another time than the recording "
                 f"({d.t_recv[0]:.6g} … {d.t_recv[-1]:.6g} s)"
             )
-        streams.append(_rows(source, t, rows.z, rows.axes))
-    return heapq.merge(*streams, key=lambda event: event[0])
-
-
-def _rows(source: int, t: list[float], z: FloatArray, axes: FloatArray) -> Iterator[Event]:
-    return ((at, source, (at, z[i], NONE, axes[i])) for i, at in enumerate(t))
+        yield iter([Report(source, at, at, rows.z[i], NONE, rows.axes[i]) for i, at in enumerate(t)])
 
 
 def _carrier(tracks: dict[str, PoseTrack], platform: str | None) -> PoseTrack | None:
@@ -106,63 +106,21 @@ def _carrier(tracks: dict[str, PoseTrack], platform: str | None) -> PoseTrack | 
     return tracks[platform]
 
 
-class _Chooser:
-    """Which detection of a look is the target, as a report."""
+class _Sent:
+    """Where the mount of a station is sent by commands: within its stops and rates, as its rotator is live."""
 
-    def __init__(self, station: Station, pointer: Pointer, recording: Recording, tracks: dict[str, PoseTrack]) -> None:
-        self.pointer, self.recording, self.tracks = pointer, recording, tracks
-        self.up = {s.id: s.sigma_up_m for s in station.file.source}
-        self.R = ecef_from_enu_rotation(recording.site)
+    def __init__(self, station: Station) -> None:
+        self.mount = station.mount
+        self.state: MountState | None = None
+        self.t = math.nan
 
-    def report(self, state: PointerState, scan: Scan) -> Report | None:
-        """Return the report nearest to the prediction, None if there is none."""
-        sensor = self.recording.sensors[scan.sensor]
-        track = self.tracks.get(sensor.platform) if sensor.platform is not None else None
-        t = scan.t - sensor.latency
-        if not len(t) or (track is not None and not track.usable(t, attitude=track.has_attitude).all()):
-            return None
-        origin, _, axes = sensor_pose(sensor, track, t)
-        where = np.stack(ecef_from_enu(origin[:, 0], origin[:, 1], origin[:, 2], self.recording.site), axis=-1)
-        best, least = None, math.inf
-        for i in range(len(t)):
-            report = self._report(scan, i, float(t[i]), where[i], self.R @ axes[i])
-            if report is None:
-                continue
-            far = self._distance(state, scan.sensor, report)
-            if best is None or far < least:
-                best, least = report, far
-        return best
-
-    def _report(self, scan: Scan, i: int, t: float, origin: FloatArray, turn: FloatArray) -> Report | None:
-        z, source = scan.z[i], self.pointer.guide.sources[scan.sensor]
-        if source.kind == DIRECTION:
-            if math.isnan(z[Component.AZIMUTH]):
-                return None
-            seen = np.array([z[Component.AZIMUTH], np.nan_to_num(z[Component.ELEVATION]), z[Component.RANGE]])
-            return t, seen, origin, turn
-        if math.isnan(z[Component.EAST]):
-            return None
-        at = origin + turn @ np.nan_to_num(z[POSITION], nan=0.0)
-        if source.correlation is None and int(scan.row[i]) not in self.recording.detections.covariance:
-            return t, at, origin, turn
-        C = scan.covariance[i][POSITION, POSITION].copy()
-        if math.isnan(z[Component.UP]):
-            C[2, :] = C[:, 2] = 0.0
-            C[2, 2] = self.up.get(source.id, source.sigma_position) ** 2
-        try:
-            return t, at, origin, source.axes_of(turn @ C @ turn.T)
-        except np.linalg.LinAlgError:
-            return None
-
-    def _distance(self, state: PointerState, source: int, report: Report) -> float:
-        """Return how far a report lies from the prediction (rad, or m for positions); 0 before there is one."""
-        t, z, origin, turn = report
-        predicted = self.pointer.guide.predict(state.guide, t)
-        if predicted is None:
-            return 0.0
-        if self.pointer.guide.sources[source].kind != DIRECTION:
-            return float(np.linalg.norm(z - predicted.position))
-        d = turn.T @ (predicted.position - origin)
-        c = math.cos(z[1])
-        u = np.array([c * math.sin(z[0]), c * math.cos(z[0]), math.sin(z[1])])
-        return float(np.arccos(np.clip(u @ d / np.linalg.norm(d), -1.0, 1.0)))
+    def step(self, p: Pointing) -> MountState:
+        """Return the position commanded at a pointing; NaN before there is one."""
+        if not np.isfinite([p.mount_azimuth, p.mount_elevation]).all():
+            return self.state or MountState(math.nan, math.nan)
+        if self.state is None:
+            self.state = self.mount.reach(p.mount_azimuth, p.mount_elevation, p.mount_azimuth)
+        else:
+            self.state = self.mount.step(self.state, p.mount_azimuth, p.mount_elevation, p.t - self.t)
+        self.t = p.t
+        return self.state

@@ -1,37 +1,49 @@
-"""Where lines come from: UDP datagrams, TCP connections, a serial port; nothing here waits."""
+"""Where bytes come from and go to: UDP datagrams, TCP connections, a serial port; nothing here waits."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import importlib
 import math
+import selectors
 import socket
 import struct
 import sys
+import threading
 import time
+from collections.abc import Iterable
 from typing import Any, Protocol
 
 from boresight.errors import UserError
+from boresight.io.jsonlines import LONGEST
 
-BUFFER = 1 << 16  # bytes kept of an unfinished line, then it is dropped
-CONNECTIONS = 32
+PER_READ = 2000  # datagrams or reads of a connection at once: then the others have their turn
+DATAGRAM = 1 << 16  # bytes
+CHUNK = 1 << 16  # bytes read from a connection at once
+RECEIVE = 8 << 20  # bytes that the system is asked to hold for a UDP port
+CONNECTIONS = 1000  # senders on one port; beyond, the one that has been silent longest goes
+SPARE = 64  # files that are left to the rest of the process
 RETRY = 0.5  # s between attempts to open a serial port that has gone
-MEMINFO, DROPS = 55, 8  # Linux: SO_MEMINFO, and where in its nine numbers the drops stand
+UNSENT = 1 << 20  # bytes that wait for one receiver; one that reads no more is hung up on
+MEMINFO, DROPS, FORCE = 55, 8, 33  # Linux: SO_MEMINFO, and where in its nine numbers the drops stand; SO_RCVBUFFORCE
 
 
 class Input(Protocol):
     """Something that has bytes, or not."""
 
-    def overflow(self) -> int:
-        """Return how many datagrams or lines came faster than they were taken, and are lost."""
+    name: str
+
+    def attach(self, selector: selectors.BaseSelector) -> bool:
+        """Register what can be waited for; false if it can only be asked."""
         ...
 
-    def read(self) -> list[bytes]:
-        """Return whole datagrams or lines that have arrived, without waiting."""
+    def read(self, ready: Iterable[Any]) -> list[bytes]:
+        """Return whole datagrams or lines that have arrived on the `ready` files, without waiting."""
         ...
 
-    def files(self) -> list[socket.socket]:
-        """Return what to wait on; empty if it can only be asked."""
+    def lost(self) -> dict[str, int]:
+        """Return what was lost, by reason, in lines (`overflow`; of datagrams that the system dropped an estimate)."""
         ...
 
     def close(self) -> None:
@@ -41,119 +53,207 @@ class Input(Protocol):
 
 def address(text: str, key: str) -> tuple[str, int]:
     """Return (host, port) of "host:port"; raises UserError."""
-    host, _, port = text.rpartition(":")
+    host, _, port = text.removeprefix("udp://").removeprefix("tcp://").rpartition(":")
     if not port.isdigit() or not 0 <= int(port) < 65536:
         raise UserError(f"{key} = '{text}': give host:port")
-    return host or "127.0.0.1", int(port)
+    return host.strip("[]") or "127.0.0.1", int(port)
+
+
+def _bound(text: str, key: str, kind: socket.SocketKind) -> socket.socket:
+    """Return a socket bound to an address; raises UserError with the system's words."""
+    host, port = address(text, key)
+    try:
+        family, _, _, _, where = socket.getaddrinfo(host, port, type=kind, flags=socket.AI_PASSIVE)[0]
+        s = socket.socket(family, kind)
+    except OSError as error:
+        raise UserError(f"{key} = '{text}': {error.strerror or error}") from None
+    try:
+        if kind == socket.SOCK_STREAM or _is_multicast(host):
+            s.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        s.bind(where)
+        if kind == socket.SOCK_DGRAM and _is_multicast(host):
+            group = struct.pack("4s4s", socket.inet_aton(host), socket.inet_aton("0.0.0.0"))
+            s.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group)
+    except OSError as error:
+        s.close()
+        raise UserError(f"{key} = '{text}': {error.strerror or error}") from None
+    s.setblocking(False)
+    return s
+
+
+def _is_multicast(host: str) -> bool:
+    first = host.split(".")[0]
+    return first.isdigit() and 224 <= int(first) <= 239
 
 
 class Udp:
     """Datagrams on a port."""
 
-    def __init__(self, text: str, most: int) -> None:
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            self.socket.bind(address(text, "input.udp"))
-        except OSError as error:
-            self.socket.close()
-            raise UserError(f"input.udp = '{text}': {error.strerror}") from None
-        self.socket.setblocking(False)
-        self.most = most
+    def __init__(self, text: str, key: str = "input.udp") -> None:
+        self.name = f"udp:{text}"
+        self.socket = _bound(text, key, socket.SOCK_DGRAM)
+        for option in (FORCE, socket.SO_RCVBUF):
+            with contextlib.suppress(OSError):
+                self.socket.setsockopt(socket.SOL_SOCKET, option, RECEIVE)
+                break
+        self.datagrams = self.lines = 0
 
-    def overflow(self) -> int:
+    def attach(self, selector: selectors.BaseSelector) -> bool:
+        """Register the socket."""
+        selector.register(self.socket, selectors.EVENT_READ, self)
+        return True
+
+    def dropped(self) -> int:
         """Return how many datagrams the system has dropped since its buffer was full; 0 where it does not say."""
         if sys.platform != "linux":
             return 0
         told = self.socket.getsockopt(socket.SOL_SOCKET, MEMINFO, 4 * (DROPS + 1))
         return int(struct.unpack(f"{len(told) // 4}I", told)[DROPS])
 
-    def read(self) -> list[bytes]:
-        """Return at most `most` datagrams: a flood waits in the system's buffer, which drops and counts."""
+    def read(self, ready: Iterable[Any] = ()) -> list[bytes]:
+        """Return datagrams: a flood waits in the system's buffer, which drops and counts."""
         out: list[bytes] = []
         with contextlib.suppress(BlockingIOError, ConnectionError):
-            while len(out) < self.most:
-                out.append(self.socket.recv(BUFFER))
+            while len(out) < PER_READ:
+                out.append(self.socket.recv(DATAGRAM))
+        self.datagrams += len(out)
+        self.lines += sum(map(lines_in, out))
         return out
 
-    def files(self) -> list[socket.socket]:
-        """Return the socket."""
-        return [self.socket]
+    def lost(self) -> dict[str, int]:
+        """Return the datagrams that the system dropped, in lines: as many in each as in those that came."""
+        gone = self.dropped()
+        return {"overflow": round(gone * max(self.lines, 1) / max(self.datagrams, 1))} if gone else {}
 
     def close(self) -> None:
         """Close the socket."""
         self.socket.close()
 
 
+def _open_files() -> int:
+    """Return how many files this process may have open."""
+    try:
+        import resource
+    except ImportError:  # not everywhere
+        return CONNECTIONS
+    limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    return CONNECTIONS + SPARE if limit == resource.RLIM_INFINITY else limit
+
+
+def lines_in(data: bytes) -> int:
+    """Return how many lines a datagram holds."""
+    return max(data.count(b"\n") + (not data.endswith(b"\n")), 1)
+
+
 class Tcp:
     """Lines from whoever connects."""
 
-    def __init__(self, text: str, most: int) -> None:
-        self.server = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        self.server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            self.server.bind(address(text, "input.tcp"))
-        except OSError as error:
-            self.server.close()
-            raise UserError(f"input.tcp = '{text}': {error.strerror}") from None
-        self.server.listen(CONNECTIONS)
-        self.server.setblocking(False)
-        self.peers: dict[socket.socket, bytes] = {}
-        self.most, self.lost = most, 0
+    def __init__(self, text: str, key: str = "input.tcp", most: int = CONNECTIONS) -> None:
+        self.name = f"tcp:{text}"
+        self.server = _bound(text, key, socket.SOCK_STREAM)
+        self.server.listen(128)
+        self.most = min(most, max(_open_files() - SPARE, 1))
+        self.peers: dict[socket.socket, bytes] = {}  # in the order in which they were last heard
+        self.selector: selectors.BaseSelector | None = None
+        self.gone: dict[str, int] = {}
 
-    def overflow(self) -> int:
-        """Return how many lines were beyond `most` in one read, or longer than the buffer."""
-        return self.lost
+    def attach(self, selector: selectors.BaseSelector) -> bool:
+        """Register the port; connections as they come."""
+        self.selector = selector
+        selector.register(self.server, selectors.EVENT_READ, self)
+        return True
 
-    def read(self) -> list[bytes]:
-        """Return whole lines; an unfinished one longer than the buffer is dropped with its beginning."""
-        with contextlib.suppress(BlockingIOError):
-            while len(self.peers) < CONNECTIONS:
-                peer, _ = self.server.accept()
-                peer.setblocking(False)
-                self.peers[peer] = b""
+    def read(self, ready: Iterable[Any] | None = None) -> list[bytes]:
+        """Return whole lines of the connections that are `ready` (all); one that is too long is dropped and counted."""
+        files = [self.server, *self.peers] if ready is None else list(ready)
+        if self.server in files:
+            self._accept()
         out: list[bytes] = []
-        for peer in list(self.peers):
-            try:
-                data = peer.recv(BUFFER)
-            except BlockingIOError:
-                continue
-            except OSError:
-                data = b""
-            if not data:
-                peer.close()
-                del self.peers[peer]
-                continue
-            *lines, rest = (self.peers[peer] + data).split(b"\n")
-            self.lost += len(rest) >= BUFFER
-            self.peers[peer] = rest if len(rest) < BUFFER else b""
-            out += lines
-        self.lost += max(len(out) - self.most, 0)
-        return out[: self.most]
+        for peer in files:
+            if peer is not self.server and peer in self.peers:
+                self._read(peer, out)
+        return out
 
-    def files(self) -> list[socket.socket]:
-        """Return the port and the connections."""
-        return [self.server, *self.peers]
+    def lost(self) -> dict[str, int]:
+        """Return lines that were too long or unfinished, and senders that were hung up on for others."""
+        return dict(self.gone)
 
     def close(self) -> None:
         """Close all connections and the port."""
-        for peer in self.peers:
-            peer.close()
+        for peer in list(self.peers):
+            self._hang_up(peer)
+        if self.selector is not None:
+            with contextlib.suppress(KeyError, ValueError):
+                self.selector.unregister(self.server)
         self.server.close()
+
+    def _accept(self) -> None:
+        for _ in range(128):
+            try:
+                peer, _ = self.server.accept()
+            except BlockingIOError:
+                return
+            except OSError as error:  # a connection that is gone again, or no file left for it
+                if error.errno not in (errno.EMFILE, errno.ENFILE) or not self.peers:
+                    return
+                self._displace()
+                continue
+            peer.setblocking(False)
+            if len(self.peers) >= self.most:
+                self._displace()
+            self.peers[peer] = b""
+            if self.selector is not None:
+                self.selector.register(peer, selectors.EVENT_READ, self)
+
+    def _displace(self) -> None:
+        """Hang up on the sender that has been silent longest."""
+        self._hang_up(next(iter(self.peers)))
+        self._count("silent_senders_closed")
+
+    def _read(self, peer: socket.socket, out: list[bytes]) -> None:
+        try:
+            data = peer.recv(CHUNK)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            if self.peers[peer].strip():
+                out.append(self.peers[peer])  # the last line need not end
+            self._hang_up(peer)
+            return
+        *lines, rest = (self.peers.pop(peer) + data).split(b"\n")
+        if len(rest) > LONGEST:
+            self._count("oversized")
+            rest = b""
+        self.peers[peer] = rest
+        out += [line for line in lines if line]
+
+    def _hang_up(self, peer: socket.socket) -> None:
+        self.peers.pop(peer, None)
+        if self.selector is not None:
+            with contextlib.suppress(KeyError, ValueError):
+                self.selector.unregister(peer)
+        peer.close()
+
+    def _count(self, why: str) -> None:
+        self.gone[why] = self.gone.get(why, 0) + 1
 
 
 class Serial:
     """Lines from a serial port (pyserial); a port that goes away is opened again."""
 
-    def __init__(self, port: str, baud: int, most: int) -> None:
+    def __init__(self, port: str, baud: int, key: str = "input.serial") -> None:
         try:
             self.serial: Any = importlib.import_module("serial")
         except ImportError:
-            raise UserError("input.serial needs pyserial: install boresight[serial]") from None
-        self.port, self.baud, self.most, self.rest = port, baud, most, b""
+            raise UserError(f"{key} needs pyserial: install boresight[serial]") from None
+        self.name = f"serial:{port}"
+        self.port, self.baud, self.rest = port, baud, b""
         self.device: Any = None
-        self.lost, self.tried = 0, -math.inf
+        self.gone, self.tried = 0, -math.inf
         if not self._open():
-            raise UserError(f"input.serial = '{port}': cannot be opened")
+            raise UserError(f"{key} = '{port}': cannot be opened")
 
     def _open(self) -> bool:
         now = time.monotonic()
@@ -166,28 +266,28 @@ class Serial:
             self.device = None
         return self.device is not None
 
-    def overflow(self) -> int:
-        """Return how many lines were beyond `most` in one read, or longer than the buffer."""
-        return self.lost
+    def attach(self, selector: selectors.BaseSelector) -> bool:
+        """Register nothing: a serial port is asked."""
+        return False
 
-    def read(self) -> list[bytes]:
+    def lost(self) -> dict[str, int]:
+        """Return how many lines were too long, or were cut off when the port went."""
+        return {"overflow": self.gone} if self.gone else {}
+
+    def read(self, ready: Iterable[Any] = ()) -> list[bytes]:
         """Return whole lines."""
         if self.device is None and not self._open():
             return []
         try:
-            data = self.device.read(BUFFER)
+            data = self.device.read(CHUNK)
         except (OSError, TypeError):  # unplugged; pyserial's own error is an OSError, a port closed under it no number
             self._unplugged()
             return []
         lines: list[bytes] = (self.rest + bytes(data)).split(b"\n")
         rest = lines.pop()
-        self.lost += (len(rest) >= BUFFER) + max(len(lines) - self.most, 0)
-        self.rest = rest if len(rest) < BUFFER else b""
-        return lines[: self.most]
-
-    def files(self) -> list[socket.socket]:
-        """Return nothing: a serial port is asked."""
-        return []
+        self.gone += len(rest) > LONGEST
+        self.rest = rest if len(rest) <= LONGEST else b""
+        return [line for line in lines if line]
 
     def close(self) -> None:
         """Close the port."""
@@ -199,28 +299,149 @@ class Serial:
     def _unplugged(self) -> None:
         """Give the port back, with the beginning of a line whose end will not come."""
         self.close()
-        self.lost += bool(self.rest)
+        self.gone += bool(self.rest)
         self.rest = b""
 
 
+class Resolver:
+    """The address of a host, found out beside the loop: a name server that is slow or gone stops nobody."""
+
+    AGAIN = 60.0  # s after which a name is asked for again
+    FAILED = 2.0  # s after which one that was not found is
+
+    def __init__(self, text: str, key: str) -> None:
+        self.text = text
+        self.host, self.port = address(text, key)
+        self.found: Any = None
+        self.family = socket.AF_INET
+        self.error = ""
+        self.errors = 0
+        self._asking: threading.Thread | None = None
+        self._next = -math.inf
+        with contextlib.suppress(OSError):
+            socket.inet_aton(self.host)
+            self.found, self._next = (self.host, self.port), math.inf
+
+    def where(self, now: float) -> Any:
+        """Return the address, None while it is not known (`now` in s, of a clock that does not step)."""
+        if now >= self._next and (self._asking is None or not self._asking.is_alive()):
+            self._next = now + (self.AGAIN if self.found else self.FAILED)
+            self._asking = threading.Thread(target=self._ask, daemon=True)
+            self._asking.start()
+        return self.found
+
+    def _ask(self) -> None:
+        try:
+            family, _, _, _, where = socket.getaddrinfo(self.host, self.port, type=socket.SOCK_DGRAM)[0]
+        except (OSError, UnicodeError) as error:
+            self.errors += 1
+            self.error = f"{self.host}: {getattr(error, 'strerror', None) or error}"
+            return
+        self.family, self.found, self.error = family, where, ""
+
+
+class UdpOut:
+    """Datagrams to one address; what the network refuses is counted and told, and the next one is tried."""
+
+    MOST = 1400  # bytes of lines that are put into one datagram
+
+    def __init__(self, text: str, key: str = "output.udp") -> None:
+        self.name = f"udp:{text}"
+        self.resolver = Resolver(text, key)
+        self.socket: socket.socket | None = None
+        self.counts = {"sent": 0, "failed": 0}
+        self.error = ""
+
+    def send(self, lines: list[bytes], now: float) -> None:
+        """Send lines (each with its end), as many in a datagram as fit."""
+        where = self.resolver.where(now)
+        if where is None:
+            self.counts["failed"] += len(lines)
+            self.error = self.resolver.error or "its name is not resolved yet"
+            return
+        some: list[bytes] = []
+        size = 0
+        for line in lines:
+            if some and size + len(line) > self.MOST:
+                self._send(b"".join(some), len(some), where)
+                some, size = [], 0
+            some.append(line)
+            size += len(line)
+        if some:
+            self._send(b"".join(some), len(some), where)
+
+    def _send(self, data: bytes, n: int, where: Any) -> None:
+        try:
+            if self.socket is None or self.socket.family != self.resolver.family:
+                self.close()
+                self.socket = socket.socket(self.resolver.family, socket.SOCK_DGRAM)
+                self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+                self.socket.setblocking(False)
+            self.socket.sendto(data, where)
+        except OSError as error:  # no route, not permitted, buffer full
+            self.counts["failed"] += n
+            self.error = error.strerror or str(error)
+            return
+        self.counts["sent"] += n
+        self.error = ""
+
+    def close(self) -> None:
+        """Close the socket."""
+        if self.socket is not None:
+            self.socket.close()
+        self.socket = None
+
+
 class Broadcast:
-    """A TCP port that sends every line to whoever is connected; one that does not read is dropped."""
+    """A TCP port that sends every line to whoever is connected; one that does not read is hung up on.
 
-    def __init__(self, text: str) -> None:
-        self.tcp = Tcp(text, 0)
+    Lines wait for a receiver that is slow, up to a limit. A receiver that has closed its own direction still reads.
+    """
 
-    def send(self, line: bytes) -> None:
-        """Send a line to all, without waiting."""
-        self.tcp.read()
-        for peer in list(self.tcp.peers):
+    def __init__(self, text: str, key: str = "output.tcp") -> None:
+        self.name = f"tcp:{text}"
+        self.server = _bound(text, key, socket.SOCK_STREAM)
+        self.server.listen(128)
+        self.peers: dict[socket.socket, bytearray] = {}
+        self.counts = {"sent": 0, "failed": 0, "receivers_closed": 0}
+        self.error = ""
+
+    def send(self, lines: list[bytes], now: float = 0.0) -> None:
+        """Send lines to all, without waiting."""
+        with contextlib.suppress(OSError):
+            while len(self.peers) < CONNECTIONS:
+                peer, _ = self.server.accept()
+                peer.setblocking(False)
+                self.peers[peer] = bytearray()
+        data = b"".join(lines)
+        for peer, waiting in list(self.peers.items()):
+            waiting += data
             try:
-                if peer.send(line) == len(line):
+                while waiting:
+                    n = peer.send(waiting)
+                    del waiting[:n]
+            except BlockingIOError:
+                if len(waiting) <= UNSENT:
                     continue
-            except OSError:
-                pass
-            peer.close()
-            del self.tcp.peers[peer]
+                self._hang_up(peer, "a receiver that reads no more was hung up on")
+                continue
+            except OSError as error:
+                self._hang_up(peer, error.strerror or str(error))
+                continue
+            self.counts["sent"] += len(lines)
+            with contextlib.suppress(OSError):  # what receivers say is read, so that it does not pile up
+                peer.recv(CHUNK)
 
     def close(self) -> None:
         """Close all connections and the port."""
-        self.tcp.close()
+        for peer in self.peers:
+            peer.close()
+        self.peers.clear()
+        self.server.close()
+
+    def _hang_up(self, peer: socket.socket, why: str) -> None:
+        self.counts["failed"] += self.peers[peer].count(b"\n")
+        self.counts["receivers_closed"] += 1
+        self.error = why
+        del self.peers[peer]
+        peer.close()

@@ -7,16 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from boresight.engine.track import run
 from boresight.frames.pose import pose_track
 from boresight.io.scans import iter_scans
-from boresight.metrics.score import score
+from boresight.metrics.score import CUT_OFF, score
 from boresight.models.motion import NearlyConstantVelocity
 from boresight.sim.actors import Drawn
 from boresight.sim.scenario import Scenario, simulate
 from boresight.study.bound import bound_at
 from boresight.study.plan import Task, build
 from boresight.tracking.config import TrackerConfig
-from boresight.tracking.run import run, track_rows, tracker_for
+from boresight.tracking.run import track_rows, tracker_for
 from boresight.types import FloatArray, Recording
 
 DEFAULTS = {2: (0.1, 8.0), 3: (1.0, 150.0)}  # q (m²/s³), speed (m/s), where the tracker's configuration says nothing
@@ -28,7 +29,7 @@ def one_run(task: Task) -> dict[str, Any]:
     scenario, config = build(json.loads(task.scenario), json.loads(task.tracker), task.seed, "study")
     recording = simulate(scenario, np.random.default_rng(task.seed))
     _, rows, _ = run(tracker_for(recording, config), iter_scans(recording))
-    scored = score(recording, track_rows(rows))
+    scored = score(recording, track_rows(rows), cut_off=CUT_OFF)
     table = next(r for r in scored.rows if r["item"] == "tracks")
     squared = np.array([v for t in scored.targets for v in t.squared_error])
     times = [np.array(t.times) for t in scored.targets]

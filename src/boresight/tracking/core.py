@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from boresight.errors import UserError
 from boresight.kernels.registration import AZIMUTH, ELEVATION, N_PARAMETERS, RANGE, SCALE, TIME
@@ -15,8 +15,9 @@ from boresight.kernels.tracker import AZIMUTH_BINS, Extras, IntArray, Models, Se
 from boresight.kernels.tracker_copies import WHOLE, Copies, each_of, no_copies
 from boresight.kernels.tracker_looks import columns_of
 from boresight.tracking.config import SensorErrors, TrackerConfig
-from boresight.types import N_COMPONENTS, Component, FloatArray, Reporting, Sensor, SensorKind
+from boresight.types import N_COMPONENTS, Component, FloatArray, Reporting, Sensor
 
+MOST_SENSORS = 62  # bits of what each track was seen by
 START_SHARE = 0.25  # of the prior speed: with that, what stood sets off where nothing is said
 CLIMB_SHARE = 0.1  # of the prior speed: vertical, where no height was measured and nothing is said
 HEIGHTS = 10  # at most, along the arc on which a sensor without elevation leaves a target
@@ -56,10 +57,15 @@ def make_plan(
     """
     d = dimensions
     flat = d == 2
+    taking = range(len(sensors)) if used is None else used
+    if len({i % MOST_SENSORS for i in taking}) < len(taking):
+        raise UserError(
+            f"{len(sensors)} sensors: the tracker tells at most {MOST_SENSORS} apart; use fewer (--sensors)"
+        )
     sigma: list[float] = []
     tau: list[float] = []
     tables = []
-    gate = math.sqrt(chi2.ppf(config.gate_probability, 1))
+    gate = math.sqrt(2.0 * gammaincinv(0.5, config.gate_probability))
     constants = [np.full(N_PARAMETERS, -1, np.int64) for _ in sensors]  # filled when the number of biases is known
     report_range = np.zeros(len(sensors))
     known: list[tuple[float, tuple[int, int]]] = []  # sigma, (sensor, parameter) of the constant errors
@@ -127,7 +133,7 @@ def _table(
         azimuth_span=min(span, 2.0 * math.pi),
         elevation_low=c.elevation[0],
         elevation_high=c.elevation[1],
-        ranging=sensor.kind not in (SensorKind.INFRARED, SensorKind.OPTICAL),
+        ranging=sensor.ranging,
         bias=bias,
         registers=False,
         constant=constant,
@@ -165,7 +171,7 @@ def _settings(
     return Settings(
         d=d,
         q=config.q if config.q is not None else (0.1 if flat else 1.0),
-        gates=np.array([0.0, *chi2.ppf(config.gate_probability, np.arange(1, 8))]),
+        gates=np.array([0.0, *(2.0 * gammaincinv(0.5 * np.arange(1, 8), config.gate_probability))]),
         speed_sigma=speed,
         birth_rate=config.birth_rate,
         survival_time=config.survival_time,

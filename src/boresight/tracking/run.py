@@ -1,17 +1,19 @@
-"""A whole recording through the tracker."""
+"""What a tracker is made of for a recording, and what comes out of it as tables."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from boresight.frames.pose import pose_track
 from boresight.kernels.tracker import NOTHING
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.names import Names
 from boresight.tracking.output import Decisions, Rows
-from boresight.tracking.tracker import REASON, Output, Tracker, TrackerState
+from boresight.tracking.tracker import REASON, Tracker, TrackerState
+from boresight.tracking.uncovered import why_uncovered
 from boresight.types import (
     FATES,
     NO_TRACK,
@@ -20,13 +22,11 @@ from boresight.types import (
     Fate,
     FloatArray,
     Recording,
-    Scan,
     TrackRows,
     TrackStatus,
     no_tracks,
 )
 
-MOST_LOOKS, MOST_REPORTS = 256, 10_000  # that reach the kernel in one call
 NAVIGATION_GAP = 10.0  # s without navigation data over which a pose is still interpolated
 PROBABLE = 0.5  # least probability of being a target or a thing with which a track is believed
 NAVIGATION_AHEAD = 5.0  # s beyond the ends over which it is still extrapolated
@@ -40,55 +40,6 @@ def tracker_for(recording: Recording, config: TrackerConfig, sensors: Sequence[s
     }
     use = None if sensors is None else tuple(sorted(recording.sensor_index(name) for name in sensors))
     return Tracker(config, recording.sensors, recording.dimensions, poses, use, recording.site.height)
-
-
-def run(
-    tracker: Tracker,
-    scans: Iterable[Scan],
-    state: TrackerState | None = None,
-    *,
-    finish: bool = True,
-    progress: Callable[[Scan], None] | None = None,
-    watch: Callable[[TrackerState, Output], None] | None = None,
-) -> tuple[TrackerState, list[Rows], list[Decisions]]:
-    """Take a tracker through scans in order of arrival, from `state` (a fresh one); consumes it.
-
-    `progress` is called with every scan taken, `watch` with the state and what each step gave, also at the end; with
-    `watch` scans are taken one by one, else many at a time.
-    """
-    state = tracker.init() if state is None else state
-    rows: list[Rows] = []
-    decisions: list[Decisions] = []
-    for some in _portions(scans, 1 if watch is not None else MOST_LOOKS):
-        state, out = tracker.steps(state, some)
-        rows += out.rows
-        decisions += out.decisions
-        if watch is not None:
-            watch(state, out)
-        if progress is not None:
-            for scan in some:
-                progress(scan)
-    if finish:
-        state, out = tracker.finish(state)
-        rows += out.rows
-        decisions += out.decisions
-        if watch is not None:
-            watch(state, out)
-    return state, rows, decisions
-
-
-def _portions(scans: Iterable[Scan], most: int) -> Iterator[list[Scan]]:
-    """Yield the scans in groups that are worth one call of the kernel and do not take much memory."""
-    some: list[Scan] = []
-    reports = 0
-    for scan in scans:
-        some.append(scan)
-        reports += len(scan.t)
-        if len(some) >= most or reports >= MOST_REPORTS:
-            yield some
-            some, reports = [], 0
-    if some:
-        yield some
 
 
 def believed(tracker: Tracker, state: TrackerState) -> tuple[float, FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -127,14 +78,35 @@ def track_rows(rows: Sequence[Rows]) -> TrackRows:
 
 def decision_rows(recording: Recording, tracker: Tracker, decisions: Sequence[Decisions], names: Names) -> DecisionRows:
     """Give every row of the recording its fate, in file order, those that never reached the tracker included."""
-    n = len(recording.detections)
+    used = np.isin(recording.detections.sensor, tracker.used)
+    out = fates_of(used, recording.duplicates & used, decisions, names, recording.refused)
+    blind = np.flatnonzero((out.fate == FATES.index(Fate.SCREENED)) & (out.reason == REASON[Fate.SCREENED]))
+    for row, why in why_uncovered(recording, tracker.poses, blind):
+        out.reason[row] = why
+    return out
+
+
+def fates_of(
+    used: NDArray[np.bool_],
+    duplicate: NDArray[np.bool_],
+    decisions: Sequence[Decisions],
+    names: Names,
+    refused: Mapping[int, str] | None = None,
+) -> DecisionRows:
+    """Give every row its fate.
+
+    `used` (n,) says of which sensors are in use, `duplicate` (n,) which repeat a row, `refused` why some rows are not
+    used at all.
+    """
+    n = len(used)
     code = {fate: FATES.index(fate) for fate in FATES}
     fate = np.full(n, code[Fate.NOT_SELECTED], np.uint8)
     reason = np.full(n, "its sensor was left out", dtype=object)
-    used = np.isin(recording.detections.sensor, tracker.used)
-    duplicate = recording.duplicates & used
     fate[duplicate] = code[Fate.DUPLICATE]
     reason[duplicate] = "the same row stands earlier"
+    for k, why in (refused or {}).items():
+        if used[k]:
+            fate[k], reason[k] = code[Fate.SCREENED], why
     birth = np.full(n, -1, np.int64)
     nis = np.full(n, np.nan)
     if decisions:

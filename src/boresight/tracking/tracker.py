@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from boresight.frames.pose import PoseTrack, add_navigation_noise, sensor_poses
-from boresight.kernels.tracker_looks import Looks, moment, places_of_looks
+from boresight.frames.pose import PoseTrack, add_navigation_noise, has_pose, sensor_poses
+from boresight.kernels.tracker_looks import NO_LOOK, Looks, moment, places_of_looks
 from boresight.kernels.tracker_rows import ARRIVAL, PENDING, RowTable, row_table, rows_at_arrival, times_due
 from boresight.tracking.config import TrackerConfig
 from boresight.tracking.core import Plan, make_plan
@@ -97,6 +97,16 @@ class Tracker:
         """Indices of the sensors in use."""
         return tuple(range(len(self.sensors))) if self.use is None else self.use
 
+    def cannot_begin(self) -> str:
+        """Return in words that no sensor in use can begin a track; empty if one can."""
+        if any(self.sensors[i].begins for i in self.used):
+            return ""
+        names = ", ".join(self.sensors[i].id for i in self.used) or "none"
+        return (
+            f"no sensor in use can begin a track ({names}): one of them has to measure range and azimuth "
+            "(sigma_range_m, sigma_azimuth_deg) or a position (sigma_position_m)"
+        )
+
     def init(self) -> TrackerState:
         """Return the state before the first look."""
         return TrackerState(empty_window(self.plan))
@@ -134,11 +144,15 @@ class Tracker:
         """Give the rows due by `t_recv` (s) although no look comes in: a stage before the tracker may hold looks."""
         return self._take(state, moment(t_recv))
 
+    def due(self, state: TrackerState, t: float) -> Output:
+        """Give the rows due by time `t` (s), nothing having arrived since: what comes later is the same without."""
+        return self._take(state, moment(t, NO_LOOK))
+
     def finish(self, state: TrackerState) -> tuple[TrackerState, Output]:
         """Give the rows that the last arrival calls for, the decisions and the smoothed rows still in the window."""
         window, out = state.window, Output([], [], [])
         if window.clock.now[PENDING]:
-            times = times_due(window.clock, self._period, np.inf)
+            times = times_due(window.tracks, self.plan.settings, window.clock, self._period, np.inf)
             rows = row_table(times * int(window.tracks.live[0]), self.dimensions)
             rows_at_arrival(
                 window.tracks, self.plan.settings, window.clock, self._period, self.config.coast_after, rows,
@@ -208,6 +222,9 @@ class Tracker:
         """Fill the poses of the looks `which` of one sensor and the noise of its navigation; `t` of all detections."""
         sensor = self.sensors[looks.sensor[which[0]]]
         track = self.poses.get(sensor.platform) if sensor.platform is not None else None
+        if sensor.platform is not None and not has_pose(sensor, track):  # none of its navigation has come
+            looks.t[which] = np.nan
+            return
         detections, poses, first = places_of_looks(looks, which)
         times = np.empty(len(poses))
         own = first[1:] + np.arange(len(which))  # the look itself stands behind its detections

@@ -17,7 +17,6 @@ from boresight.kernels.tracker_copies import (
     tracks_with_room,
 )
 from boresight.kernels.tracker_looks import (
-    NO_SENSOR,
     Looks,
     chosen,
     front,
@@ -97,7 +96,7 @@ def take(
     order = queue.order[: int(queue.length[0])]
     limit = _needed(window.copies, every, order, length, keep_after)
     taken, sensor = fates.outcome[total - new : total] == TAKEN, every.sensor[total - new :]
-    rejected = total - new + np.flatnonzero(~taken & (sensor != NO_SENSOR))
+    rejected = total - new + np.flatnonzero(~taken & (sensor >= 0))
     window.order = order[limit:].copy()
     return rows, what_became(window, np.concatenate([rejected, order[:limit]]))
 

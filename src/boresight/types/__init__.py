@@ -3,9 +3,12 @@
 from boresight.types.enums import N_COMPONENTS, Axes, Component, Fate, Reporting, SensorKind, TrackStatus
 from boresight.types.recording import Detections, Ignore, PlatformTrack, Recording, Truth
 from boresight.types.results import (
+    COVARIANCE,
+    ENU,
     FATES,
     NO_TRACK,
     STATUSES,
+    VELOCITY,
     DecisionRows,
     RegistrationRows,
     Results,
@@ -13,14 +16,17 @@ from boresight.types.results import (
     no_tracks,
 )
 from boresight.types.scan import Scan, address_code, addresses_of
-from boresight.types.sensor import Coverage, FloatArray, Mount, Sensor, Site
+from boresight.types.sensor import Coverage, FloatArray, Mount, Sensor, Site, Station
 from boresight.types.state import GaussianState, Pose, UpdateInfo
 
 __all__ = [
+    "COVARIANCE",
+    "ENU",
     "FATES",
     "NO_TRACK",
     "N_COMPONENTS",
     "STATUSES",
+    "VELOCITY",
     "Axes",
     "Component",
     "Coverage",
@@ -41,6 +47,7 @@ __all__ = [
     "Sensor",
     "SensorKind",
     "Site",
+    "Station",
     "TrackRows",
     "TrackStatus",
     "Truth",

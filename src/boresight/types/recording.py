@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -34,7 +35,10 @@ class Detections:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlatformTrack:
-    """Stamped navigation data of one platform; NaN where not given. `ypr` is yaw, pitch, roll (rad), NED to FRD."""
+    """Stamped navigation data of one platform; NaN where not given. `ypr` is yaw, pitch, roll (rad), NED to FRD.
+
+    `at_rest`: its one row holds for all times.
+    """
 
     id: str
     t: FloatArray  # (n,) s, ascending
@@ -43,6 +47,8 @@ class PlatformTrack:
     ypr: FloatArray  # (n, 3) rad
     sigma_position: FloatArray  # (n,) m
     sigma_attitude: FloatArray  # (n,) rad
+    t_recv: FloatArray | None = None  # (n,) s, when each arrived; None: with its stamp
+    at_rest: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +59,7 @@ class Truth:
     t: FloatArray  # (n,) s, ascending
     position: FloatArray  # (n, 3) site ENU m
     velocity: FloatArray  # (n, 3) m/s, NaN where not given
+    sigma: FloatArray | None = None  # (n,) m per axis: the reference's own error, NaN where not given
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,6 +85,21 @@ class Recording:
     truth: tuple[Truth, ...] = ()
     ignore: tuple[Ignore, ...] = ()
     duplicates: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))  # (n,) row stood earlier
+    refused: Mapping[int, str] = field(default_factory=dict)  # rows of the detections that are not used, and why
+    notes: tuple[str, ...] = ()  # what the user is to know of the files: one line each
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """(n,) False for rows of the detections that are refused: their stamps or values say nothing."""
+        out = np.ones(len(self.detections), dtype=bool)
+        out[list(self.refused)] = False
+        return out
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last stamp (s) of the detections that are not refused; of all where every one is."""
+        t = self.detections.t[self.usable] if len(self.refused) < len(self.detections) else self.detections.t
+        return float(t.min()), float(t.max())
 
     def sensor_index(self, sensor_id: str) -> int:
         """Return the index of a sensor by id; raises KeyError."""

@@ -11,6 +11,16 @@ from numpy.typing import NDArray
 from boresight.types.enums import Fate, TrackStatus
 from boresight.types.sensor import FloatArray
 
+ENU = ("east_m", "north_m", "up_m")
+VELOCITY = ("ve_m_s", "vn_m_s", "vu_m_s")
+COVARIANCE = {
+    "cov_ee": (0, 0),
+    "cov_en": (0, 1),
+    "cov_nn": (1, 1),
+    "cov_eu": (0, 2),
+    "cov_nu": (1, 2),
+    "cov_uu": (2, 2),
+}
 STATUSES: tuple[TrackStatus, ...] = tuple(TrackStatus)  # code -> status
 FATES: tuple[Fate, ...] = tuple(Fate)  # code -> fate
 NO_TRACK = -1
@@ -31,6 +41,26 @@ class TrackRows:
     def __len__(self) -> int:
         return len(self.t)
 
+    def columns(self) -> dict[str, Any]:
+        """Return the columns of tracks.parquet, null where there is no number."""
+        out: dict[str, Any] = {
+            "t_s": self.t,
+            "t_known_s": self.t_known,
+            "track_id": self.track_id.astype(np.int64),
+            "status": _words(self.status, STATUSES),
+        }
+        out |= {n: _nullable(self.position[:, i]) for i, n in enumerate(ENU)}
+        out |= {n: _nullable(self.velocity[:, i]) for i, n in enumerate(VELOCITY)}
+        return out | {n: _nullable(self.covariance[:, i, j]) for n, (i, j) in COVARIANCE.items()}
+
+    def to_arrow(self) -> Any:
+        """Return tracks.parquet as a pyarrow.Table."""
+        return _table(self.columns())
+
+    def to_pandas(self) -> Any:
+        """Return tracks.parquet as a pandas.DataFrame; needs pandas."""
+        return self.to_arrow().to_pandas()
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DecisionRows:
@@ -45,6 +75,27 @@ class DecisionRows:
 
     def __len__(self) -> int:
         return len(self.row)
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns of decisions.parquet, null where there is no number."""
+        import pyarrow as pa
+
+        out: dict[str, Any] = {
+            "row": self.row.astype(np.int64),
+            "fate": _words(self.fate, FATES),
+            "track_id": pa.array(self.track_id.astype(np.int64), mask=self.track_id == NO_TRACK),
+            "nis": _nullable(self.nis),
+            "reason": pa.array(self.reason.tolist(), pa.string()),
+        }
+        return out | {name: pa.array(values, from_pandas=True) for name, values in self.extra.items()}
+
+    def to_arrow(self) -> Any:
+        """Return decisions.parquet as a pyarrow.Table."""
+        return _table(self.columns())
+
+    def to_pandas(self) -> Any:
+        """Return decisions.parquet as a pandas.DataFrame; needs pandas."""
+        return self.to_arrow().to_pandas()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,3 +137,21 @@ def no_tracks() -> TrackRows:
         np.zeros((0, 3)),
         np.zeros((0, 3, 3)),
     )
+
+
+def _table(columns: dict[str, Any]) -> Any:
+    import pyarrow as pa
+
+    return pa.table({k: v if isinstance(v, pa.Array | pa.ChunkedArray) else pa.array(v) for k, v in columns.items()})
+
+
+def _nullable(values: FloatArray) -> Any:
+    import pyarrow as pa
+
+    return pa.array(np.ascontiguousarray(values, dtype=np.float64), from_pandas=True)
+
+
+def _words(codes: NDArray[np.uint8], words: tuple[Any, ...]) -> Any:
+    import pyarrow as pa
+
+    return pa.array(np.array([str(w) for w in words], dtype=object)[codes], pa.string())

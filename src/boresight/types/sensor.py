@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from boresight.types.enums import N_COMPONENTS, Axes, Reporting, SensorKind
+from boresight.types.enums import N_COMPONENTS, Axes, Component, Reporting, SensorKind
 
 FloatArray = NDArray[np.float64]
 
@@ -30,6 +30,14 @@ class Mount:
     pitch: float = 0.0
     roll: float = 0.0
     lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """Where a fixed sensor stands: site east, north, up (m), and the rotation (3, 3) from its level axes."""
+
+    position: tuple[float, float, float]
+    enu_from_local: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +68,8 @@ class Sensor:
     messages of one target, and `p_detection` the probability that a target reports at all when it is due.
     `p_wrong_id` is the probability that a `source_id` is not the target's own (None: 0.02 where reporting is SINGLE,
     else `source_id` is not used). `height` is the prior of the targets' height above the ellipsoid (mean and standard
-    deviation, m), for a sensor that does not measure it (None: what the elevation coverage allows).
+    deviation, m), for a sensor that does not measure it (None: what the elevation coverage allows). `station` is where
+    a sensor without a platform stands (None: at the site's origin); its axes are then those of the local level there.
     """
 
     id: str
@@ -77,3 +86,22 @@ class Sensor:
     reporting: Reporting = Reporting.SCAN
     p_wrong_id: float | None = None
     height: tuple[float, float] | None = None
+    station: Station | None = None
+
+    @property
+    def ranging(self) -> bool:
+        """Whether it measures where things are, and not only in which direction: by its sigmas, not by its kind.
+
+        A sensor that declares no sigma at all (its rows bring theirs) goes by its kind.
+        """
+        if np.isnan(self.sigma).all():
+            return self.kind not in (SensorKind.INFRARED, SensorKind.OPTICAL)
+        return bool(np.isfinite(self.sigma[[Component.RANGE, Component.EAST]]).any())
+
+    @property
+    def begins(self) -> bool:
+        """Whether one detection of it can begin a track: range and azimuth, or east and north."""
+        if np.isnan(self.sigma).all():
+            return self.ranging
+        polar = self.sigma[[Component.RANGE, Component.AZIMUTH]]
+        return bool(np.isfinite(polar).all() or np.isfinite(self.sigma[[Component.EAST, Component.NORTH]]).all())

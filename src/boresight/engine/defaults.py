@@ -15,9 +15,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from boresight.engine.track import run
 from boresight.io.scans import iter_scans, selected
 from boresight.tracking.config import TrackerConfig
-from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
+from boresight.tracking.run import decision_rows, track_rows, tracker_for
 from boresight.tracking.tuning import Thread, likelihoods, threads
 from boresight.types import (
     FATES,

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from boresight.stages.protocol import Belief, Note, Stage
-from boresight.tracking.output import Decisions, Rows
-from boresight.tracking.run import believed
-from boresight.tracking.run import run as run_tracker
-from boresight.tracking.tracker import Output, Tracker, TrackerState
 from boresight.types import FATES, NO_TRACK, DecisionRows, Fate, Scan
 
 DEPTH = 3  # stages that make values
@@ -44,39 +40,6 @@ class Pipeline:
     def finish(self, state: list[Any]) -> list[Note]:
         """Return what became of the reports still held: no track may know of them, or an end would tell the future."""
         return [note for stage, one in zip(self.stages, state, strict=True) for note in stage.finish(one)]
-
-
-def run(
-    pipeline: Pipeline,
-    tracker: Tracker,
-    scans: Iterable[Scan],
-    progress: Callable[[Scan], None] | None = None,
-    watch: Callable[[TrackerState, Output], None] | None = None,
-) -> tuple[TrackerState, list[Rows], list[Decisions], list[Note]]:
-    """Take looks in order of arrival through the stages and the tracker, to the end, as `tracking.run.run` does."""
-    if not pipeline.stages:
-        return *run_tracker(tracker, scans, progress=progress, watch=watch), []
-    state, held = tracker.init(), pipeline.init()
-    rows: list[Rows] = []
-    decisions: list[Decisions] = []
-    notes: list[Note] = []
-    for scan in scans:
-        rows += tracker.tick(state, scan.t_recv).rows
-        held, ready, told = pipeline.step(held, scan, Belief(*believed(tracker, state)))
-        notes += told
-        for one in ready:
-            state, out = tracker.step(state, one)
-            rows += out.rows
-            decisions += out.decisions
-            if watch is not None:
-                watch(state, out)
-        if progress is not None:
-            progress(scan)
-    notes += pipeline.finish(held)
-    state, out = tracker.finish(state)
-    if watch is not None:
-        watch(state, out)
-    return state, rows + out.rows, decisions + out.decisions, notes
 
 
 def with_notes(decisions: DecisionRows, notes: Sequence[Note]) -> DecisionRows:

@@ -1,0 +1,1 @@
+"""One loop for recordings and for live feeds: Source, Stage, Estimator, Sink."""
