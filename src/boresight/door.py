@@ -226,7 +226,9 @@ class Tracker:
         if riding:
             raise UserError(f"Tracker: sensor '{riding[0]}' rides on a platform; track a recording, or use serve")
         site = Site(math.radians(self.site_latitude_deg), math.radians(self.site_longitude_deg), self.site_height_m)
-        self._core = core.Tracker(self.config or TrackerConfig(), tuple(self.sensors), self.dimensions)
+        self._core = core.Tracker(
+            self.config or TrackerConfig(), tuple(self.sensors), self.dimensions, site_height=self.site_height_m
+        )
         self._state = self._core.init()
         self._decoder = LookDecoder(tuple(self.sensors), site, self.dimensions)
 

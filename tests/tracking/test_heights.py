@@ -10,8 +10,21 @@ import pytest
 
 from boresight.frames.pose import pose_track
 from boresight.tracking.config import TrackerConfig
+from boresight.tracking.heights import height_not_observed, told_of_heights
 from boresight.tracking.tracker import Tracker, TrackerState
-from boresight.types import Axes, Coverage, FloatArray, PlatformTrack, Scan, Sensor, SensorKind
+from boresight.types import (
+    Axes,
+    Coverage,
+    Detections,
+    FloatArray,
+    PlatformTrack,
+    Recording,
+    Scan,
+    Sensor,
+    SensorKind,
+    Site,
+    no_tracks,
+)
 
 AZIMUTH, ELEVATION, UP = 1, 2, 6
 
@@ -185,3 +198,26 @@ def test_with_two_models_of_motion_each_height_has_both() -> None:
 def test_in_two_dimensions_and_with_elevation_there_is_one_height() -> None:
     assert Tracker(TrackerConfig(), (radar(),), 2).plan.models is None
     assert Tracker(TrackerConfig(), (with_elevation(),), 3).plan.models is None
+
+
+def test_rows_whose_height_nobody_told_are_said() -> None:
+    """Two rows of 3 km and 50 m; with 0 ± 3 m declared, 50 m is no better than that, and 0.5 m is."""
+    n = 3
+    covariance = np.tile(np.eye(3), (n, 1, 1))
+    covariance[:, 2, 2] = [3000.0**2, 50.0**2, 0.5**2]
+    rows = replace(
+        no_tracks(), t=np.zeros(n), t_known=np.zeros(n), track_id=np.ones(n, np.int64), covariance=covariance
+    )
+    none, whole, wide = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 7))
+    empty = Detections(none, none, whole, whole, wide, wide, {})
+    recording = Recording("r", 3, Site(0.8, 0.1, 0.0), (radar(),), empty, (), (), (), np.zeros(0, np.bool_))
+    assert height_not_observed(recording, rows).tolist() == [True, False, False]
+    lines = told_of_heights(recording, rows)
+    assert lines[0].startswith("radar: height not observed")
+    assert lines[1].startswith("height not observed in 33 % of the rows")
+    sea = replace(recording, sensors=(radar(height=(0.0, 3.0)),))
+    assert height_not_observed(sea, rows).tolist() == [True, True, False]
+    assert "0 ± 3 m above the ellipsoid" in told_of_heights(sea, rows)[0]
+    for silent in (replace(recording, dimensions=2), replace(recording, sensors=(with_elevation(),))):
+        assert told_of_heights(silent, rows) == []
+        assert not height_not_observed(silent, rows).any()

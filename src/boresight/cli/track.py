@@ -93,13 +93,15 @@ def track(
     results.summary["recording_folder"] = str(rec)
     results.summary["config_file"] = None if source is None else str(source)
     results.summary["settings_from_the_recording"] = chosen
+    heights, refuted = _told_of(recording, results, ids)
+    results.summary["heights_not_observed"], results.summary["covariances_refuted"] = heights, refuted
     with output_folder(output, force) as folder:
         write_results(results, recording, folder)
     if report:  # once the results are safe
         from boresight.report.html import write_report
 
         write_report(output / "report.html", results, recording)
-    print_notes(loss_lines(recording, results.decisions))
+    print_notes([*loss_lines(recording, results.decisions), *heights, *refuted])
     counts = results.summary["counts"]
     row = {"output": str(output), **counts, "seconds": results.summary["seconds"]}
     if json:
@@ -113,6 +115,14 @@ def track(
             print(line)
         for c in results.summary.get("registration", []):
             print(f"{c['sensor']}: {c['parameter']} {c['value']:.3g} ± {c['sigma']:.2g} (1σ): {c['verdict']}")
+
+
+def _told_of(recording: Recording, results: Results, ids: list[str] | None) -> tuple[list[str], list[str]]:
+    """Return what there is to say of heights that no sensor measured, and of sensors whose NIS refutes the tracks."""
+    from boresight.engine.defaults import consistency
+    from boresight.tracking.heights import told_of_heights
+
+    return told_of_heights(recording, results.tracks, ids), consistency(recording, results.decisions)
 
 
 def sensor_ids(recording: Recording, sensors: str | None) -> list[str] | None:

@@ -85,6 +85,7 @@ def defaults_for(recording: Recording, sensors: Sequence[str] | None = None) -> 
                 value, config, decisions = again, wilder, rows
         lines.append(f"settings from the innovations of {len(found)} tracks in the first {span:.0f} s:")
     else:
+        config = replace(config, q=min(config.q or math.inf, base.q or math.inf), speed_sigma=max(moved, SPEEDS[0]))
         lines.append(f"settings for the speed that fits the first {span:.0f} s best (no track long enough for more):")
     return config, [*lines, *told(config)]
 

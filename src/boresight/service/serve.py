@@ -64,7 +64,7 @@ def parts_of(service: Service) -> Parts:
     d = service.declaration
     decoder = decoder_of(d, service.logged)
     poses = LivePoses(d.site, 0.0, sigmas_of(service.logged))
-    tracker = Tracker(service.config, d.sensors, d.dimensions, poses)
+    tracker = Tracker(service.config, d.sensors, d.dimensions, poses, site_height=d.site.height)
     poses.kept = service.logged.oldest_s + tracker.length + 15.0
     empty = np.zeros(0)
     nothing = Detections(

@@ -80,7 +80,7 @@ class ScreenStage:
             keep = ~bad
             scan = Scan(
                 scan.sensor, scan.t_look, scan.t_recv, scan.t[keep], scan.z[keep], scan.covariance[keep],
-                scan.row[keep], scan.empty_rows,
+                scan.row[keep], scan.empty_rows, None if scan.address is None else scan.address[keep],
             )  # fmt: skip
         return state, Stepped((scan,), notes)
 

@@ -79,7 +79,7 @@ class SmoothStage:
             _write(z[i], moved, bool(directions[i]))
             R[i] *= max(1.0, float(w @ w))
         state[scan.sensor] = trails
-        out = Scan(scan.sensor, scan.t_look, scan.t_recv, scan.t, z, R, scan.row, scan.empty_rows)
+        out = Scan(scan.sensor, scan.t_look, scan.t_recv, scan.t, z, R, scan.row, scan.empty_rows, scan.address)
         return state, Stepped((out,))
 
     def finish(self, state: dict[int, list[Trail]]) -> tuple[Note, ...]:
