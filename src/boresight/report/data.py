@@ -145,6 +145,7 @@ def _recorded(recording: Recording, results: Results, first: float, last: float)
     if recording.truth:
         scored = score(recording, results.tracks, results.decisions, results.summary.get("sensors"))
         data |= _scored(scored, recording.dimensions, first, last)
+        data["notes"] = [*recording.notes, *scored.notes]
     return data
 
 
