@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from boresight._version import __version__
 from boresight.config.stages import make_pipeline
 from boresight.config.tracker import parameters_of
+from boresight.engine.defaults import defaults_for
 from boresight.engine.loop import run
 from boresight.engine.pipeline import Pipeline, with_notes
 from boresight.engine.portions import MOST_LOOKS, Portions
@@ -34,7 +35,7 @@ from boresight.tracking.run import decision_rows, track_rows, tracker_for
 from boresight.tracking.warm import warm_poses, warm_tracker
 from boresight.types import FATES, DecisionRows, FloatArray, Recording, Results, Scan, Sensor, Site
 
-__all__ = ["Prepared", "Track", "Tracker", "prepare", "read_recording", "sensor", "track"]
+__all__ = ["Prepared", "Track", "Tracker", "defaults_for", "prepare", "read_recording", "sensor", "track"]
 
 
 def track(
@@ -49,7 +50,7 @@ def track(
 
     Args:
         recording: as `read_recording` gives it.
-        config: settings of the tracker, in SI and radians; None takes the defaults.
+        config: settings of the tracker, in SI and radians; None takes what `defaults_for` makes of the recording.
         sensors: ids of the sensors to use (all).
         stages: the pipeline before the tracker, as `config.pipeline.take_pipeline` gives it (none).
         progress: called with every look that was taken.
@@ -57,7 +58,7 @@ def track(
     Returns tracks, decisions and a summary; `results.tracks.to_arrow()`, `results.tracks.to_pandas()` are the tables
     of tracks.parquet and decisions.parquet. Raises UserError for an unknown sensor, or stages that do not fit.
     """
-    return prepare(recording, config or TrackerConfig(), sensors, stages).run(progress)
+    return prepare(recording, config or defaults_for(recording, sensors)[0], sensors, stages).run(progress)
 
 
 def prepare(

@@ -144,7 +144,8 @@ def test_shares_weigh_the_hypotheses_and_only_the_own_detection_counts(own: int)
     tr.life[0, 3] = 2.0
     look, room = look_at(points)._replace(dt=np.array([0.0, 0.25])), workroom(4)
     at = PLACES_OF(look, plan.settings, sensor, np.ones(2, np.bool_))
-    moving = [multivariate_normal.pdf(z, tr.x[0, :2], tr.P[0, :2, :2] + 4.0 * np.eye(2)) for z in points]
+    at_own_time = [(tr.x[0, :2] + dt * tr.x[0, 2:], tr.P[0, :2, :2] + dt**2 * tr.P[0, 2:, 2:]) for dt in look.dt]
+    moving = [multivariate_normal.pdf(z, x, P + 4.0 * np.eye(2)) for z, (x, P) in zip(points, at_own_time, strict=True)]
     static = [multivariate_normal.pdf(z, anchor, A + 4.0 * np.eye(2)) for z in points]
     start, column = np.array([0, 2]), np.array([0, 1])
     TAKE_SHARES(tr, 0, plan.settings, sensor, look, at, room, start, column, share, own, p_d, 1.0, None)

@@ -19,7 +19,7 @@ from boresight.types import Axes, Coverage, Detections, Recording, Sensor, Senso
 from tests.tracking.conftest import make_recording
 
 Q, SIGMA, SPEED, LAG, PERIOD = 0.05, 2.0, 6.0, 4.0, 0.7
-CONFIG = TrackerConfig(q=Q, speed_sigma=SPEED, smoothing_lag=LAG)
+CONFIG = TrackerConfig(q=Q, speed_sigma=SPEED, smoothing_lag=LAG, rest_time=1e12)
 
 
 def lone_target() -> Recording:

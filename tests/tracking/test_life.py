@@ -441,3 +441,16 @@ def test_a_smoothed_row_coasts_after_the_last_hit_that_the_track_ever_had() -> N
     assert min(coasting) < 10.0
     assert max(coasting) > 14.0
     assert all(c == (t > 10.0 + 3.0) for t, c in coasting.items())
+
+
+@pytest.mark.parametrize("hide", [6.0, np.inf])
+def test_a_row_coasts_at_its_own_time_and_ends_when_it_is_told_to(hide: float) -> None:
+    """Two sensors fall silent: 3 s later rows coast, 6 s later there are none, whatever is believed."""
+    used = tracker(coast_after=3.0, hide_after=hide)
+    state = after(used, [[300.0, 400.0]])
+    out = used.tick(state, 25.0)
+    t = np.concatenate([r.t for r in out.rows])
+    coasting = np.concatenate([r.coasting for r in out.rows])
+    np.testing.assert_array_equal(coasting, t > 10.0 + 3.0)
+    assert coasting.any()
+    assert t.max() == pytest.approx(16.0 if np.isfinite(hide) else 25.0, abs=0.5)

@@ -26,7 +26,13 @@ from boresight.types import Recording, Scan, Sensor, SensorKind
 NAN = float("nan")
 QUIET, MANOEUVRE, EVERY, LASTS = 0.01, 4.0, 30.0, 8.0
 CONFIG = TrackerConfig(
-    q=QUIET, q_manoeuvre=MANOEUVRE, manoeuvre_every=EVERY, manoeuvre_lasts=LASTS, gate_probability=0.999999, window=0.0
+    q=QUIET,
+    q_manoeuvre=MANOEUVRE,
+    manoeuvre_every=EVERY,
+    manoeuvre_lasts=LASTS,
+    gate_probability=0.999999,
+    window=0.0,
+    rest_time=1e12,
 )
 
 

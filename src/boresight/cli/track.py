@@ -71,7 +71,15 @@ def track(
     ids = sensor_ids(recording, sensors)
     source = config if config is not None else (rec / BESIDE if (rec / BESIDE).is_file() else None)
     known = [s.id for s in recording.sensors]
-    settings, stages = (TrackerConfig(), {}) if source is None else read_configuration(source, known)
+    chosen: list[str] = []
+    if source is None:
+        with loading():
+            from boresight.engine.defaults import defaults_for
+
+            settings, chosen = defaults_for(recording, ids)
+        stages: dict[str, Any] = {}
+    else:
+        settings, stages = read_configuration(source, known)
     if lag is not None:
         if not 0.0 <= lag <= LONGEST_LAG:
             raise UserError(f"--lag: {lag} s; give 0 to {LONGEST_LAG:g} s")
@@ -84,6 +92,7 @@ def track(
     results.summary["command"] = shlex.join(command)
     results.summary["recording_folder"] = str(rec)
     results.summary["config_file"] = None if source is None else str(source)
+    results.summary["settings_from_the_recording"] = chosen
     with output_folder(output, force) as folder:
         write_results(results, recording, folder)
     if report:  # once the results are safe
@@ -100,6 +109,8 @@ def track(
             f"wrote {output}: {counts['tracks']} tracks, {counts['rows']} rows, from {counts['reports']} reports "
             f"in {results.summary['seconds']:.2f} s"
         )
+        for line in chosen:
+            print(line)
         for c in results.summary.get("registration", []):
             print(f"{c['sensor']}: {c['parameter']} {c['value']:.3g} ± {c['sigma']:.2g} (1σ): {c['verdict']}")
 

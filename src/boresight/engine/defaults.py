@@ -80,9 +80,9 @@ def defaults_for(recording: Recording, sensors: Sequence[str] | None = None) -> 
             value, decisions, moved = _explained(recording, scans, config, sensors)
             found = _threads(recording, decisions, config, sensors) or found
         for wilder in livelier(config):  # tracks that were lost in a turn taught nothing of it
-            again, _, _ = _explained(recording, scans, wilder, sensors)
-            if again > value + 0.5 * FRAGMENT:
-                value, config = again, wilder
+            again, rows, _ = _explained(recording, scans, wilder, sensors)
+            if again > value and _tracks(rows) < _tracks(decisions):
+                value, config, decisions = again, wilder, rows
         lines.append(f"settings from the innovations of {len(found)} tracks in the first {span:.0f} s:")
     else:
         lines.append(f"settings for the speed that fits the first {span:.0f} s best (no track long enough for more):")
@@ -166,13 +166,12 @@ def learned(config: TrackerConfig, found: list[Thread], dimensions: int) -> Trac
 
 
 def livelier(config: TrackerConfig) -> list[TrackerConfig]:
-    """Return settings with more process noise, in manoeuvres or in all."""
+    """Return settings with more process noise in manoeuvres."""
     if config.q_manoeuvre is not None:
         lasts = 3.0 * (config.manoeuvre_lasts or 10.0)
         return [replace(config, q_manoeuvre=f * config.q_manoeuvre, manoeuvre_lasts=lasts) for f in (5.0, 25.0)]
     q = config.q or NOISES[0]
-    wild = [replace(config, q_manoeuvre=f * q, manoeuvre_every=60.0, manoeuvre_lasts=10.0) for f in (50.0, 500.0)]
-    return [replace(config, q=5.0 * q), *wild]
+    return [replace(config, q_manoeuvre=f * q, manoeuvre_every=60.0, manoeuvre_lasts=10.0) for f in (50.0, 500.0)]
 
 
 def consistency(recording: Recording, decisions: DecisionRows) -> list[str]:
@@ -243,6 +242,11 @@ def _explained(
     velocity = track_rows(made).velocity[:, :2]
     speed = 1.5 * math.sqrt(float((velocity**2).mean())) if len(velocity) else 0.0
     return float(taken.sum()) - FRAGMENT * len(np.unique(rows.track_id[taken])), rows, speed
+
+
+def _tracks(rows: DecisionRows) -> int:
+    """Return how many tracks were shown."""
+    return len(np.unique(rows.track_id[rows.track_id != NO_TRACK]))
 
 
 def _threads(

@@ -72,9 +72,9 @@ class TrackerConfig:
     hide_time: float = 120.0  # s, mean time for which a target stays visible
     show_time: float = 10.0  # s, mean time for which it stays hidden
     static_share: float = 0.3  # of new objects do not move (and are not reported)
-    static_q: float = 0.1  # m²/s, how an object that does not move may still wander
+    static_q: float = 0.05  # m²/s, how an object that does not move may still wander
     stop_floor: float = 0.02  # least weight of "it stands still" beside that of a moving target
-    rest_time: float = 600.0  # s, mean time for which what stands stays so, until it sets off (inf: for ever)
+    rest_time: float = 300.0  # s, mean time for which what stands stays so, until it sets off (inf: for ever)
     start_speed: float | None = None  # m/s, per axis, at about which it does (None: a quarter of speed_sigma)
     targets_at_start: float = 5.0  # expected number of targets before the first look
     apart: float = 0.0  # m: a track nearer than this to a shown one is not shown beside it
