@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from boresight.tracking.defaults import consistency, declared, defaults_for
 
 from boresight.config.scenario import read_scenario
 from boresight.io.scans import iter_scans
 from boresight.metrics.score import score
 from boresight.sim.scenario import simulate
 from boresight.tracking.config import TrackerConfig
-from boresight.tracking.defaults import consistency, declared, defaults_for
 from boresight.tracking.run import decision_rows, run, track_rows, tracker_for
 from boresight.types import Detections, Recording, Reporting, Sensor, SensorKind, Site, Truth
 from tests.tracking.test_messages import SEA
