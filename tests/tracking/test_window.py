@@ -110,3 +110,19 @@ def test_positions_beyond_the_coverage_are_counted_and_begin_nothing() -> None:
     state, _ = tracker.step(tracker.init(), Scan(0, 0.0, 0.0, np.zeros(2), z, R, np.arange(2)))
     _, out = tracker.finish(state)
     assert [FATES[c] for d in out.decisions for c in d.fate.tolist()] == [Fate.INITIATED, Fate.OUT_OF_COVERAGE]
+
+
+def test_a_silence_of_years_gives_no_rows(harbour: Recording) -> None:
+    """Ten years without a report, in which no track can live on: rows end with the tracks."""
+    silence = 3e8
+    d, ferry = harbour.detections, harbour.platforms[0]
+    late = np.where(d.t > 30.0, silence, 0.0)
+    moved = dataclasses.replace(d, t=d.t + late, t_recv=d.t_recv + late)
+    away = dataclasses.replace(ferry, t=ferry.t + np.where(ferry.t > 30.0, silence, 0.0))
+    recording = dataclasses.replace(harbour, detections=moved, platforms=(away,))
+    rows = track_rows(run(tracker_for(recording, CONFIG), iter_scans(recording))[1])
+    last = CONFIG.survival_time * np.log(1.0 / CONFIG.hide_below)
+    between = (rows.t > 30.0 + last + 1.0) & (rows.t < silence + 30.0)
+    assert not between.any()
+    assert (rows.t < 30.0).any()
+    assert (rows.t > silence + 35.0).any()
