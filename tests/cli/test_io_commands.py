@@ -182,3 +182,12 @@ def test_names_are_shown_as_they_are(run: Run, tmp_path: Path) -> None:
         assert ran.code == 0
         assert name.replace("\\u001b", "\\x1b") in ran.out
         assert "\x1b" not in ran.out
+
+
+def test_results_of_another_recording_are_refused(run: Run, out: Path, tmp_path: Path) -> None:
+    detections, sensors = files(tmp_path, "t_s,sensor,scan,range_m,azimuth_deg\n1,radar,0,900,20\n")
+    (tmp_path / "t.csv").write_text("t_s,target,east_m,north_m\n0,a,1,2\n9,a,2,3\n")
+    words = ("--sensors", sensors, "--truth", tmp_path / "t.csv", "-o", tmp_path / "other")
+    assert run("import", "csv", detections, *words).code == 0
+    for command in ("score", "report", "play"):
+        refused(run(command, out, tmp_path / "other"), "give the recording that was tracked")

@@ -151,6 +151,16 @@ def test_time_unit(unit: str, stamps, seconds, tmp_path: Path) -> None:
         read(tmp_path, "d", time_unit="furlong")
 
 
+def test_time_unit_leaves_files_in_seconds_alone(tmp_path: Path) -> None:
+    write(tmp_path, d="t_s,sensor,scan,range_m,azimuth_deg\n1764547200000,radar,0,900,20\n")
+    (tmp_path / "t.csv").write_text("t_s,target,east_m,north_m\n1764547199.5,a,1,2\n1764547210,a,1,2\n")
+    recording, _ = import_csv(
+        tmp_path / "d.csv", write(tmp_path), truth=tmp_path / "t.csv", options=Options(time_unit="ms")
+    )
+    assert recording.detections.t[0] == 1764547200.0
+    assert recording.truth[0].t[0] == 1764547199.5
+
+
 def test_time_offset_and_ignored_columns(tmp_path: Path) -> None:
     rows = "0,radar,0,900,20,4.2,x\n18.5,ais,0,,,1,y\n"
     write(tmp_path, d="t_s,sensor,scan,range_m,azimuth_deg,snr,note\n" + rows)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from boresight.errors import UserError
 from boresight.io.recording import read_recording
 from boresight.io.results import read_results
 from boresight.types import Recording, Results
@@ -45,8 +46,27 @@ def report(
 def recording_of(results: Results, rec: Path | None) -> Recording | None:
     """Return the recording named, else the one that the summary names if it is still there, else None."""
     if rec is not None:
-        return read_recording(rec)
+        recording = read_recording(rec)
+        check_belongs(results, recording, rec)
+        return recording
     named = results.summary.get("recording_folder")
     if isinstance(named, str) and (Path(named) / "recording.toml").is_file():
-        return read_recording(Path(named))
+        recording = read_recording(Path(named))
+        check_belongs(results, recording, Path(named))
+        return recording
     return None
+
+
+def check_belongs(results: Results, recording: Recording, rec: Path) -> None:
+    """Raise UserError when results were not made from a recording: another number of reports or dimensions."""
+    made, has = len(results.decisions), len(recording.detections)
+    about = results.summary.get("recording")
+    about = about if isinstance(about, dict) else {}
+    of = f" of '{about['name']}'" if isinstance(about.get("name"), str) else ""
+    if made != has:
+        raise UserError(f"{rec}: has {has} reports, the results{of} are of {made}: give the recording that was tracked")
+    if about.get("dimensions", recording.dimensions) != recording.dimensions:
+        raise UserError(
+            f"{rec}: is {recording.dimensions}-D, the results{of} are {about['dimensions']}-D: give the recording that "
+            "was tracked"
+        )

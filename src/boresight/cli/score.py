@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from boresight.cli.output import print_json, print_notes, print_table
+from boresight.cli.report import check_belongs
 from boresight.errors import UserError
 from boresight.io.recording import read_recording
 from boresight.io.results import read_results
@@ -84,7 +85,7 @@ def score_command(
         if results.smoothed is None:
             raise UserError(f"{out}: no smoothed.parquet; write it with: boresight track {rec} -o {out} --lag 5")
         results = replace(results, tracks=results.smoothed)
-    check_belongs(results, recording, out, rec)
+    check_belongs(results, recording, rec)
     print_notes(recording.notes)
     scored = score(recording, results.tracks, results.decisions, results.summary.get("sensors"), cut_off_m)
     rows = [*scored.rows, *losses(recording, results.decisions)]
@@ -111,23 +112,6 @@ def score_command(
     print_table(SENSORS, [r for r in rows if r["item"] == "sensor"])
     for line in loss_lines(recording, results.decisions):
         print(line)
-
-
-def check_belongs(results: Results, recording: Recording, out: Path, rec: Path) -> None:
-    """Raise UserError when results were not made from a recording: another number of reports or dimensions."""
-    made, has = len(results.decisions), len(recording.detections)
-    about = results.summary.get("recording")
-    about = about if isinstance(about, dict) else {}
-    of = f" (of '{about['name']}')" if isinstance(about.get("name"), str) else ""
-    if made != has:
-        raise UserError(
-            f"{out}: its results{of} are of {made} reports, {rec} has {has}: score with the recording tracked"
-        )
-    if about.get("dimensions", recording.dimensions) != recording.dimensions:
-        raise UserError(
-            f"{out}: its results{of} are {about['dimensions']}-D, {rec} is {recording.dimensions}-D: score with the "
-            "recording that was tracked"
-        )
 
 
 def score_rows(recording: Recording, results: Results) -> list[dict[str, Any]]:

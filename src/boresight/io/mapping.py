@@ -41,6 +41,7 @@ from boresight.types import FloatArray, Sensor
 MOST_PROBLEMS = 8  # of one file that are told at once
 EACH, STAMP, TURN, NORTH = "each row", "each stamp", "each turn", "north mark"
 PLACE = ("latitude_deg", "longitude_deg", "height_m", MSL)
+DATES = (9.4e8, 4.2e9)  # Unix seconds, 1999 to 2103
 SCANS = (EACH, STAMP, TURN, NORTH)
 REQUIRED = {
     "detections": ("t_s", "sensor"),
@@ -192,11 +193,20 @@ def _time_units(raw: Raw, columns: Mapping[str, str], units: Mapping[str, str], 
         if ours not in ("t_s", "t_recv_s"):
             continue
         cell = next((c for c in raw.cells[raw.header.index(name)] if c), "0")
-        if given is not None:
+        if given is not None and _may_be(cell.replace(raw.decimal, "."), given):
             out[name] = given
         if not _is_number(cell.replace(raw.decimal, ".")):
             out[name] = ISO
     return out
+
+
+def _may_be(cell: str, unit: str) -> bool:
+    """Whether a stamp may be in a unit: a date in seconds, as truth may have, is not in milliseconds or of the day."""
+    value = abs(float(cell)) if _is_number(cell) else 0.0
+    longest = {DAY_SECONDS: 86400.0, WEEK_SECONDS: 604800.0}.get(unit)
+    if longest is not None:
+        return value <= longest
+    return not (TIME[unit] < 1.0 and DATES[0] <= value <= DATES[1])
 
 
 def converted(raw: Raw, of: FileMap, declared: Declaration) -> Table:
@@ -481,7 +491,7 @@ def _size_of_stamps(raw: Raw, columns: Mapping[str, str], units: dict[str, str])
             continue
         cell = next((c for c in raw.cells[raw.header.index(name)] if c), "0").replace(raw.decimal, ".")
         for unit, size in (("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
-            if 9.4e8 * size <= abs(float(cell)) <= 4.2e9 * size:
+            if DATES[0] * size <= abs(float(cell)) <= DATES[1] * size:
                 units[name] = unit
 
 

@@ -14,6 +14,7 @@ from boresight.io import paths
 from boresight.io.declaration import Declaration, read_declaration, write_declaration
 from boresight.io.files import RECORDING, output_folder
 from boresight.io.livelog import is_log
+from boresight.io.reporting import misplaced
 from boresight.io.stamps import newest
 from boresight.io.table import Table, read_table, write_table
 from boresight.types import Axes, Detections, PlatformTrack, Recording, Sensor
@@ -63,7 +64,7 @@ def assemble(
     others += [(f"target '{p.target}' of the truth", float(p.t[0]), float(p.t[-1])) for p in true]
     rows, duplicates, refused = det.detections_of(detections, declared.sensors, others)
     check_navigation(declared.sensors, rows, platforms, where)
-    return Recording(
+    recording = Recording(
         name=declared.name,
         dimensions=declared.dimensions,
         site=declared.site,
@@ -78,6 +79,7 @@ def assemble(
             note for table in (detections, platform, truth, ignore) if table is not None for note in table.notes
         ),
     )
+    return replace(recording, notes=(*recording.notes, *misplaced(recording)))
 
 
 def check_navigation(

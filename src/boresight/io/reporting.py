@@ -103,20 +103,29 @@ def place_notes(recording: Recording, force: bool) -> list[str]:
             where = {"platform_enu": "north-aligned", "body": "of its body", "mount": "of the mount on its body"}
             axes = str(sensor.axes)
             said.append(f"{sensor.id}: axes = \"{axes}\" ({where.get(axes, '')}, at platform '{sensor.platform}')")
-    for name, place in places(recording):
-        far = np.linalg.norm(place[:, :2], axis=1)
-        said.append(f"{name}: {_span(far)} from the site")
-        swapped = _swapped(place[int(np.argmax(far))], recording.site)
-        why = ""
-        if float(far.max()) > FAR:
-            why = f"{far.max() / 1e3:.0f} km from the site"
-        elif float(far.min()) > 5e4 and swapped < SWAPPED * float(far.max()):
-            why = f"{far.min() / 1e3:.0f} km from the site"
-        if why and swapped < SWAPPED * float(far.max()):
-            why += f", {swapped / 1e3:.0f} km with latitude and longitude the other way round"
-        if why and not force:
-            raise UserError(f"{name} lies {why}; correct it or the [site], or give --far if it is right")
+    said += [f"{name}: {_span(np.linalg.norm(place, axis=1))} from the site" for name, place in places(recording)]
+    for why in misplaced(recording):
+        if not force:
+            raise UserError(f"{why}; correct it or the [site], or give --far if it is right")
     return said
+
+
+def misplaced(recording: Recording) -> list[str]:
+    """Return, in words, which platforms and sensors are further from the site than one place can be (1000 km).
+
+    So are those of more than 50 km that are near with latitude and longitude the other way round.
+    """
+    out = []
+    for name, place in places(recording):
+        far = np.linalg.norm(place, axis=1)
+        if far.max() <= 5e4:
+            continue
+        swapped = _swapped(place[int(np.argmax(far))], recording.site)
+        other = swapped < SWAPPED * float(far.max())
+        if float(far.max()) > FAR or (other and float(far.min()) > 5e4):
+            turned = f", {swapped / 1e3:.0f} km with latitude and longitude the other way round" if other else ""
+            out.append(f"{name} lies {far.max() / 1e3:.0f} km from the site{turned}")
+    return out
 
 
 def coverage_notes(recording: Recording) -> list[str]:

@@ -27,6 +27,7 @@ LARGEST = 1e11  # s: no date
 ANOTHER_EPOCH = 1e6  # s
 LONGEST_DELAY = 600.0  # s between stamp and arrival; more is another clock
 MOST_PARTS = 3000  # of one sensor's stamps between jumps; more is no clock at all
+MOST_COMPARED = 5000  # rows of a sensor whose offset is looked at
 AROUND = 5  # rows of other sensors before and after, to compare a stamp with
 UNIX = (9.4e8, 4.2e9)  # s: 1999 to 2103
 UNITS = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
@@ -223,7 +224,7 @@ def _seconds(value: float) -> str:
 
 
 def _reference(
-    t: FloatArray, sensor: IntArray, good: NDArray[np.bool_], i: int, rows: IntArray
+    t: FloatArray, sensor: IntArray, good: NDArray[np.bool_], i: int, rows: IntArray, around: int = AROUND
 ) -> tuple[FloatArray, FloatArray]:
     """The median stamps of the few rows of other sensors before, and of those after, each of `rows` in the file."""
     other = np.flatnonzero(good & (sensor != i))
@@ -232,7 +233,7 @@ def _reference(
     at = np.searchsorted(other, rows)[:, None]
     before, after = (
         np.asarray(np.median(t[other[np.clip(at + near, 0, len(other) - 1)]], axis=1))
-        for near in (np.arange(-AROUND, 0), np.arange(AROUND))
+        for near in (np.arange(-around, 0), np.arange(around))
     )
     return before, after
 
@@ -244,13 +245,19 @@ def _unlike_others(t: FloatArray, sensor: IntArray, jump: FloatArray, good: NDAr
         rows = np.flatnonzero(good & (sensor == i))
         if len(rows) < 4:
             continue
+        limit = jump[i] + float(np.max(jump[np.arange(len(jump)) != i])) + BEHIND
+        before, after = _reference(t, sensor, good, i, rows, 1)
+        near = np.stack([t[rows] - before, t[rows] - after])
+        middle = float(np.median(near))
+        rows = rows[(np.abs(near - middle) > limit).any(axis=0)]  # most are not: the rest is looked at closely
+        if not len(rows) > 0:
+            continue
+        n = near.shape[1]
         before, after = _reference(t, sensor, good, i, rows)
         off = t[rows] - 0.5 * (before + after)
-        middle = float(np.median(off))
         apart = 0.5 * np.abs(after - before)  # where all clocks jump, a stamp on either side is right
-        limit = jump[i] + float(np.max(jump[np.arange(len(jump)) != i])) + BEHIND
         odd = np.flatnonzero(np.abs(off - middle) > limit + apart)
-        if 0 < len(odd) <= max(FEW * len(rows), 1.0):
+        if 0 < len(odd) <= max(FEW * n, 1.0):
             for k in odd.tolist():
                 side = "after" if off[k] > middle else "before"
                 far = _seconds(abs(float(off[k] - middle)))
@@ -623,6 +630,7 @@ def _offsets(
     spread: dict[int, float] = {}
     for i in present:
         rows = np.flatnonzero(sorted_sensor == i)
+        rows = rows[:: max(len(rows) // MOST_COMPARED, 1)]
         before, after = _reference(sorted_t, sorted_sensor, np.ones(len(order), dtype=bool), i, rows)
         d = sorted_t[rows] - 0.5 * (before + after)
         off[i] = float(np.median(d))

@@ -143,8 +143,12 @@ def _recorded(recording: Recording, results: Results, first: float, last: float)
         "nis": nis_of(recording, results.decisions, first, last),
     }
     if recording.truth:
-        scored = score(recording, results.tracks, results.decisions, results.summary.get("sensors"))
+        try:
+            scored = score(recording, results.tracks, results.decisions, results.summary.get("sensors"))
+        except UserError as error:  # nothing that the tracker used can be scored: the rest is shown
+            return data | {"notes": [*recording.notes, str(error)]}
         data |= _scored(scored, recording.dimensions, first, last)
+        data["notes"] = [*recording.notes, *scored.notes]
     return data
 
 

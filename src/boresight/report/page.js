@@ -450,7 +450,10 @@ if (own) {
 // ---------- sensors
 if (D.inventory) {
   const rows = D.inventory.filter(r => r.item === "sensor");
-  $("sensors").append(table([["id", "sensor", true], ["kind", "kind", true], ["platform", "platform", true], ["looks", "looks"], ["empty_looks", "empty"], ["detections", "detections"], ["detections_per_look", "per look"], ["median_period_s", "period, s"], ["longest_gap_s", "longest gap, s"], ["latency_s", "declared delay, s"], ["mean_arrival_delay_s", "stamp to arrival, s"], ["out_of_order", "out of order"], ["duplicates", "duplicates"]], rows));
+  $("sensors").append(table([["id", "sensor", true], ["kind", "kind", true], ["platform", "platform", true], ["looks", "looks"], ["empty_looks", "empty"], ["detections", "detections"], ["detections_per_look", "per look"], ["median_period_s", "period, s"], ["longest_gap_s", "longest gap, s"], ["latency_s", "declared delay, s"], ["mean_arrival_delay_s", "stamp to arrival, s"], ["out_of_order", "out of order"], ["refused", "refused"], ["duplicates", "duplicates"]], rows));
+  const ranges = rows.flatMap(r => Object.entries(r.measured || {}).map(([column, [least, largest]]) => ({id: r.id, column, least, largest, axes: r.axes})));
+  if (ranges.length) $("sensors").append(make("details", {}, make("summary", {}, "ranges of what was measured"), table([["id", "sensor", true], ["column", "column", true], ["least", "least"], ["largest", "largest"], ["axes", "axes", true]], ranges)));
+  for (const r of (D.inventory || []).filter(r => r.farthest_m != null)) $("sensors").append(make("p", {class: "note"}, `${r.item} ${r.id}: ${sig(r.nearest_m / 1e3, 4)} to ${sig(r.farthest_m / 1e3, 4)} km from the site`));
   const box = make("div", {class: "chart"});
   $("looks").append(make("h3", {}, "Reports in time (darker is more; white is a gap)"), box);
   drawn(() => {
