@@ -7,23 +7,20 @@ refused, lost or undone by hand is sent again, and what cannot be mended is told
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import math
 import socket
-import threading
 from collections.abc import Callable
 from dataclasses import replace
 
 from boresight.frames.tangent import separation
 from boresight.pointing.mount import TURN, Mount, MountState
-from boresight.service.sockets import address
+from boresight.service.sockets import Host, address
 from boresight.types.sensor import FloatArray
 
 Path = Callable[[], tuple[FloatArray, FloatArray] | None]
 
 RETRY = 1.0  # s between attempts to connect
-RESOLVE = 10.0  # s between attempts to find the host's address
 SPACING = 0.5  # s between the directions of a path
 SILENT = 3.0  # s without an answer after which the connection is given up
 SETTLE = 2.0  # s off its command without coming nearer after which the command is sent again
@@ -48,7 +45,7 @@ class Rotator:
     """
 
     def __init__(self, text: str, mount: Mount, dead_band: float, period: float) -> None:
-        self.host = _Host(*address(text, "output.rotctld"))
+        self.host = Host(*address(text, "output.rotctld"))
         self.mount, self.dead_band, self.period = mount, dead_band, period
         self.socket: socket.socket | None = None
         self.counts = dict.fromkeys(
@@ -351,44 +348,6 @@ class Rotator:
         towards = off_target(before, self.commanded.azimuth, self.commanded.elevation) - off
         if off <= self.dead_band or towards > NEARER:
             self.near_since, self.idle = now, 0
-
-
-class _Host:
-    """A host's address, asked for once and in the background: the name service may take seconds."""
-
-    def __init__(self, host: str, port: int) -> None:
-        self.host, self.port = host, port
-        self.why = f"looking for {host}"
-        self.named = True
-        self._found: tuple[socket.AddressFamily, tuple[object, ...]] | None = None
-        self._asked = -math.inf
-        self._thread: threading.Thread | None = None
-        for family in (socket.AF_INET, socket.AF_INET6):
-            with contextlib.suppress(OSError):
-                socket.inet_pton(family, host)
-                self._found, self.named = (family, (host, port)), False
-
-    def found(self, now: float) -> tuple[socket.AddressFamily, tuple[object, ...]] | None:
-        """Return family and address, None while they are not known."""
-        busy = self._thread is not None and self._thread.is_alive()
-        if self._found is None and now - self._asked >= RESOLVE and not busy:
-            self._asked = now
-            self._thread = threading.Thread(target=self._resolve, daemon=True)
-            self._thread.start()
-            self._thread.join(0.05)  # names of this machine are known at once
-        return self._found
-
-    def forget(self) -> None:
-        """Look a name up again before the next attempt: nothing answered at its address."""
-        if self.named:
-            self._found = None
-
-    def _resolve(self) -> None:
-        try:
-            first = socket.getaddrinfo(self.host, self.port, type=socket.SOCK_STREAM)[0]
-            self._found = (first[0], first[4])
-        except (OSError, UnicodeError) as error:
-            self.why = f"{self.host}: {getattr(error, 'strerror', None) or error}"
 
 
 def off_target(position: MountState, azimuth: float, elevation: float) -> float:

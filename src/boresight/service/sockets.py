@@ -25,6 +25,7 @@ RECEIVE = 8 << 20  # bytes that the system is asked to hold for a UDP port
 CONNECTIONS = 1000  # senders on one port; beyond, the one that has been silent longest goes
 SPARE = 64  # files that are left to the rest of the process
 RETRY = 0.5  # s between attempts to open a serial port that has gone
+RESOLVE = 10.0  # s between attempts to find the host's address
 UNSENT = 1 << 20  # bytes that wait for one receiver; one that reads no more is hung up on
 MEMINFO, DROPS, FORCE = 55, 8, 33  # Linux: SO_MEMINFO, and where in its nine numbers the drops stand; SO_RCVBUFFORCE
 
@@ -303,41 +304,42 @@ class Serial:
         self.rest = b""
 
 
-class Resolver:
-    """The address of a host, found out beside the loop: a name server that is slow or gone stops nobody."""
+class Host:
+    """A host's address, asked for once and in the background: the name service may take seconds."""
 
-    AGAIN = 60.0  # s after which a name is asked for again
-    FAILED = 2.0  # s after which one that was not found is
+    def __init__(self, host: str, port: int, kind: socket.SocketKind = socket.SOCK_STREAM) -> None:
+        self.host, self.port, self.kind = host, port, kind
+        self.why = f"looking for {host}"
+        self.named = True
+        self._found: tuple[socket.AddressFamily, tuple[object, ...]] | None = None
+        self._asked = -math.inf
+        self._thread: threading.Thread | None = None
+        for family in (socket.AF_INET, socket.AF_INET6):
+            with contextlib.suppress(OSError):
+                socket.inet_pton(family, host)
+                self._found, self.named = (family, (host, port)), False
 
-    def __init__(self, text: str, key: str) -> None:
-        self.text = text
-        self.host, self.port = address(text, key)
-        self.found: Any = None
-        self.family = socket.AF_INET
-        self.error = ""
-        self.errors = 0
-        self._asking: threading.Thread | None = None
-        self._next = -math.inf
-        with contextlib.suppress(OSError):
-            socket.inet_aton(self.host)
-            self.found, self._next = (self.host, self.port), math.inf
+    def found(self, now: float) -> tuple[socket.AddressFamily, tuple[object, ...]] | None:
+        """Return family and address, None while they are not known."""
+        busy = self._thread is not None and self._thread.is_alive()
+        if self._found is None and now - self._asked >= RESOLVE and not busy:
+            self._asked = now
+            self._thread = threading.Thread(target=self._resolve, daemon=True)
+            self._thread.start()
+            self._thread.join(0.05)  # names of this machine are known at once
+        return self._found
 
-    def where(self, now: float) -> Any:
-        """Return the address, None while it is not known (`now` in s, of a clock that does not step)."""
-        if now >= self._next and (self._asking is None or not self._asking.is_alive()):
-            self._next = now + (self.AGAIN if self.found else self.FAILED)
-            self._asking = threading.Thread(target=self._ask, daemon=True)
-            self._asking.start()
-        return self.found
+    def forget(self) -> None:
+        """Look a name up again before the next attempt: nothing answered at its address."""
+        if self.named:
+            self._found = None
 
-    def _ask(self) -> None:
+    def _resolve(self) -> None:
         try:
-            family, _, _, _, where = socket.getaddrinfo(self.host, self.port, type=socket.SOCK_DGRAM)[0]
+            first = socket.getaddrinfo(self.host, self.port, type=self.kind)[0]
+            self._found = (first[0], first[4])
         except (OSError, UnicodeError) as error:
-            self.errors += 1
-            self.error = f"{self.host}: {getattr(error, 'strerror', None) or error}"
-            return
-        self.family, self.found, self.error = family, where, ""
+            self.why = f"{self.host}: {getattr(error, 'strerror', None) or error}"
 
 
 class UdpOut:
@@ -347,40 +349,41 @@ class UdpOut:
 
     def __init__(self, text: str, key: str = "output.udp") -> None:
         self.name = f"udp:{text}"
-        self.resolver = Resolver(text, key)
+        self.host = Host(*address(text, key), socket.SOCK_DGRAM)
         self.socket: socket.socket | None = None
         self.counts = {"sent": 0, "failed": 0}
         self.error = ""
 
     def send(self, lines: list[bytes], now: float) -> None:
         """Send lines (each with its end), as many in a datagram as fit."""
-        where = self.resolver.where(now)
-        if where is None:
+        found = self.host.found(now)
+        if found is None:
             self.counts["failed"] += len(lines)
-            self.error = self.resolver.error or "its name is not resolved yet"
+            self.error = self.host.why
             return
         some: list[bytes] = []
         size = 0
         for line in lines:
             if some and size + len(line) > self.MOST:
-                self._send(b"".join(some), len(some), where)
+                self._send(b"".join(some), len(some), *found)
                 some, size = [], 0
             some.append(line)
             size += len(line)
         if some:
-            self._send(b"".join(some), len(some), where)
+            self._send(b"".join(some), len(some), *found)
 
-    def _send(self, data: bytes, n: int, where: Any) -> None:
+    def _send(self, data: bytes, n: int, family: socket.AddressFamily, where: tuple[Any, ...]) -> None:
         try:
-            if self.socket is None or self.socket.family != self.resolver.family:
+            if self.socket is None or self.socket.family != family:
                 self.close()
-                self.socket = socket.socket(self.resolver.family, socket.SOCK_DGRAM)
+                self.socket = socket.socket(family, socket.SOCK_DGRAM)
                 self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
                 self.socket.setblocking(False)
             self.socket.sendto(data, where)
         except OSError as error:  # no route, not permitted, buffer full
             self.counts["failed"] += n
             self.error = error.strerror or str(error)
+            self.host.forget()
             return
         self.counts["sent"] += n
         self.error = ""
