@@ -23,9 +23,8 @@ def test_many_looks_at_a_time_give_what_one_by_one_gives(harbour: Recording, lag
     # late looks, looks older than the window, and looks for which there is no pose
     cut = dataclasses.replace(harbour.platforms[0], t=harbour.platforms[0].t.clip(max=40.0))
     keep = np.concatenate([[True], np.diff(cut.t) > 0.0])
-    short = dataclasses.replace(
-        cut, **{f.name: getattr(cut, f.name)[keep] for f in dataclasses.fields(cut) if f.name != "id"}
-    )
+    columns = {f.name: v for f in dataclasses.fields(cut) if isinstance(v := getattr(cut, f.name), np.ndarray)}
+    short = dataclasses.replace(cut, **{n: v[keep] for n, v in columns.items()})
     recording = dataclasses.replace(harbour, platforms=(short,))
     tracker = tracker_for(recording, dataclasses.replace(CONFIG, window=1.2, smoothing_lag=lag))
     scans = list(iter_scans(recording))
