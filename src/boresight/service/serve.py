@@ -8,7 +8,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -443,7 +443,7 @@ def warm(parts: Parts) -> None:
             line = {"platform": name, "t_s": t, "east_m": t, "north_m": 0.0, "up_m": 0.0, "yaw_deg": 1.0}
             m = line_of(msgspec.json.encode(line))
             poses.take(Fix(name, t, t, navigation(m, d.site, d.dimensions == 2)))
-    scratch = Tracker(tracker.config, tracker.sensors, tracker.dimensions, poses)
+    scratch = replace(tracker, poses=poses)
     scratch.looks([Scan(i, 0.1, 0.2, *NOTHING) for i in range(len(d.sensors))])
     one = np.zeros(1)
     geodetic_from_enu(*enu_from_geodetic(one + d.site.latitude, one + d.site.longitude, one, d.site), d.site)
