@@ -139,8 +139,8 @@ def run(scene: Scene, seconds: list[tuple[float, int]], folder: Path) -> dict[st
         [*command, "--json", "--force"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert process.stderr is not None
-    while "listening" not in (line := process.stderr.readline()):
-        if not line:
+    while "listening" not in (told_line := process.stderr.readline()):
+        if not told_line:
             raise SystemExit("the service did not start")
     threading.Thread(target=process.stderr.read, daemon=True).start()
     t0 = time.time()
@@ -200,7 +200,10 @@ def kills(scene: Scene, times: int, folder: Path) -> dict[str, Any]:
                 k += 1
 
     command = [sys.executable, "-m", "boresight", "serve", str(folder / "site.toml"), "--log", str(folder / "log")]
-    restarts, cut, same, false = [], 0, [], [[], []]
+    restarts: list[float] = []
+    same: list[float] = []
+    false: tuple[list[float], list[float]] = ([], [])
+    cut = 0
     before: dict[int, int] = {}
     thread = threading.Thread(target=send, daemon=True)
     for k in range(times + 1):
@@ -212,7 +215,7 @@ def kills(scene: Scene, times: int, folder: Path) -> dict[str, Any]:
             text=True,
         )
         assert process.stderr is not None
-        said = []
+        said: list[str] = []
         while "listening" not in (line := process.stderr.readline()):
             if not line:
                 raise SystemExit("".join(said))
