@@ -258,6 +258,8 @@ class Tracker:
             scan = self._decoder.look(index[sensor], float(t_s), _measured(columns), arrival)
         except Refused as error:
             raise UserError(f"take: sensor '{sensor}': {error}") from None
+        self._decoder.duplicates.clear()
+        self._decoder.ids.clear()
         self._arrival = arrival
         if scan is not None:
             self._state, out = self._core.step(self._state, scan)

@@ -78,3 +78,36 @@ def test_a_sensors_key_reaches_its_field_in_the_unit_of_its_name(key: str, tmp_p
 def test_every_field_of_a_sensor_has_one_key() -> None:
     fields = sorted(field.name for field in dataclasses.fields(SensorErrors))
     assert sorted(field for field, _ in SENSOR_KEYS.values()) == fields
+
+
+def test_what_ranges_goes_by_what_is_measured_and_that_nothing_can_begin_is_said() -> None:
+    from boresight.tracking.tracker import Tracker
+    from boresight.types import Sensor, SensorKind
+
+    def one(name: str, kind: SensorKind, *known: int) -> Sensor:
+        sigma = np.full(7, np.nan)
+        sigma[list(known)] = 1e-2
+        return Sensor(name, kind, sigma=sigma)
+
+    finder = one("finder", SensorKind.RADAR, 1, 3)  # azimuth and range rate: called a radar, and ranges nothing
+    rangefinder = one("rangefinder", SensorKind.OPTICAL, 0, 1)
+    assert not finder.ranging
+    assert rangefinder.ranging
+    assert one("ais", SensorKind.POSITION, 4, 5).begins
+    assert not one("ring", SensorKind.RADAR, 0).begins  # a range alone is no place
+    alone = Tracker(TrackerConfig(), (finder,), 2)
+    assert "no sensor in use can begin a track (finder)" in alone.cannot_begin()
+    assert Tracker(TrackerConfig(), (finder, rangefinder), 2).cannot_begin() == ""
+    assert Tracker(TrackerConfig(), (finder, rangefinder), 2, use=(0,)).cannot_begin()
+
+
+def test_sensors_that_could_not_be_told_apart_are_refused() -> None:
+    from boresight.tracking.tracker import Tracker
+    from boresight.types import Sensor, SensorKind
+
+    sigma = np.full(7, np.nan)
+    sigma[[0, 1]] = 1.0, 0.01
+    many = tuple(Sensor(f"r{i}", SensorKind.RADAR, sigma=sigma) for i in range(63))
+    with pytest.raises(UserError, match="at most 62"):
+        Tracker(TrackerConfig(), many, 2)
+    Tracker(TrackerConfig(), many, 2, use=tuple(range(1, 63)))

@@ -137,12 +137,12 @@ class LookDecoder:
     rows: int = 0
     arrival: float = -math.inf  # s, newest
     health: dict[str, SourceHealth] = field(default_factory=dict)
-    duplicates: list[int] = field(default_factory=list)  # rows found since this was last emptied
+    duplicates: list[tuple[int, int]] = field(default_factory=list)  # row, and which it repeats, since last emptied
     sensor_of: NDArray[np.int16] = field(default_factory=lambda: np.full(KEPT_ROWS, -1, np.int16))  # of row % KEPT_ROWS
     ids: dict[int, str] = field(default_factory=dict)  # sources' own identities by row, until they are taken out
     _index: dict[str, int] = field(init=False)
     _newest_fix: dict[str, float] = field(default_factory=dict)
-    _seen: dict[bytes, None] = field(default_factory=dict)
+    _seen: dict[bytes, int] = field(default_factory=dict)  # row by content
     _order: deque[tuple[float, bytes]] = field(default_factory=deque)
     _covariance: dict[tuple[int, bytes], FloatArray] = field(default_factory=dict)
 
@@ -175,7 +175,7 @@ class LookDecoder:
             "arrival": self.arrival,
             "health": {name: h.saved() for name, h in self.health.items()},
             "fixes": self._newest_fix,
-            "seen": [[t, key.hex()] for t, key in self._order],
+            "seen": [[t, key.hex(), self._seen[key]] for t, key in self._order],
         }
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -183,8 +183,8 @@ class LookDecoder:
         self.rows, self.arrival = int(saved["rows"]), float(saved["arrival"])
         self.health.update({name: restored(h) for name, h in saved["health"].items()})
         self._newest_fix.update(saved["fixes"])
-        self._order = deque((float(t), bytes.fromhex(key)) for t, key in saved["seen"])
-        self._seen = dict.fromkeys(key for _, key in self._order)
+        self._order = deque((float(t), bytes.fromhex(key)) for t, key, _ in saved["seen"])
+        self._seen = {bytes.fromhex(key): int(row) for _, key, row in saved["seen"]}
 
     def _refuse(self, name: str, error: Refused) -> None:
         self.health.setdefault(name, SourceHealth()).count(error.reason, str(error))
@@ -281,7 +281,7 @@ class LookDecoder:
         twice = self._repeated(sensor, t, np.hstack([z, sigma]), full, [d.source_id for d in found], first)
         rows = first + np.arange(len(found))
         for i, d in enumerate(found):
-            if d.source_id is not None:
+            if d.source_id is not None and not twice[i]:
                 self.ids[first + i] = d.source_id
         if any(twice):
             keep = np.flatnonzero(~np.array(twice))
@@ -380,11 +380,11 @@ class LookDecoder:
             if name is not None:
                 h.update(name.encode("utf-8", "surrogatepass"))
             key = h.digest()
-            twice = key in self._seen
+            before = self._seen.setdefault(key, first + i)
+            twice = before != first + i
             if twice:
-                self.duplicates.append(first + i)
+                self.duplicates.append((first + i, before))
             else:
-                self._seen[key] = None
                 self._order.append((self.arrival, key))
             out.append(twice)
         while self._order and self._order[0][0] < self.arrival - 2.0 * self.oldest:

@@ -66,7 +66,7 @@ def recording_of_log(folder: Path) -> Recording:
     reader = LogReader(folder)
     scans: list[Scan] = []
     fixes: dict[str, list[Fix]] = {}
-    duplicates: list[int] = []
+    repeats: dict[int, int] = {}  # row of a duplicate, and which it repeats
     for record in reader:
         if record.kind != Kind.TAKEN:
             continue
@@ -75,7 +75,7 @@ def recording_of_log(folder: Path) -> Recording:
                 scans.append(item)
             else:
                 fixes.setdefault(item.platform, []).append(item)
-        duplicates += decoder.duplicates
+        repeats.update(decoder.duplicates)
         decoder.duplicates.clear()
     for words in reader.damage:
         print(f"boresight: {folder}: {words}", file=sys.stderr)
@@ -84,27 +84,26 @@ def recording_of_log(folder: Path) -> Recording:
     sigmas = sigmas_of(about)
     platforms = tuple(platform_track(name, rows, sigmas.get(name)) for name, rows in fixes.items())
     twice = np.zeros(decoder.rows, np.bool_)
-    twice[duplicates] = True
+    twice[list(repeats)] = True
     name = declared.name or folder.resolve().name
-    detections = _detections(scans, decoder)
+    detections = _detections(scans, decoder, repeats)
     return Recording(
         name, declared.dimensions, declared.site, declared.sensors, detections, platforms, duplicates=twice
     )
 
 
-def _detections(scans: list[Scan], decoder: LookDecoder) -> Detections:
-    """Lay looks end to end as rows of detections; a row that was in no look (a duplicate) is one of its own."""
+def _detections(scans: list[Scan], decoder: LookDecoder, repeats: dict[int, int]) -> Detections:
+    """Lay looks end to end as rows of detections; a duplicate, which was in no look, is the row that it repeats."""
     n = decoder.rows
     t, arrived = np.zeros(n), np.zeros(n)
     sensor, look = np.zeros(n, np.int64), np.zeros(n, np.int64)
     z, sigma = np.full((n, 7), np.nan), np.full((n, 7), np.nan)
     full: dict[int, Any] = {}
     ids: list[str | None] = [None] * n
-    filled = np.zeros(n, np.bool_)
     for k, scan in enumerate(scans):
         rows = scan.row if len(scan.t) else np.array(scan.empty_rows)
         t[rows] = scan.t if len(scan.t) else scan.t_look
-        arrived[rows], sensor[rows], look[rows], filled[rows] = scan.t_recv, scan.sensor, k, True
+        arrived[rows], sensor[rows], look[rows] = scan.t_recv, scan.sensor, k
         if len(scan.t):
             z[rows] = scan.z
             diagonal = np.diagonal(scan.covariance, axis1=1, axis2=2)
@@ -114,7 +113,10 @@ def _detections(scans: list[Scan], decoder: LookDecoder) -> Detections:
                 full[int(rows[i])] = scan.covariance[i]
     for row, name in decoder.ids.items():
         ids[row] = name
-    for row in np.flatnonzero(~filled).tolist():  # of a look all of whose rows, or this one, stood before
-        before = max(row - 1, 0)
-        t[row], arrived[row], sensor[row], look[row] = t[before], arrived[before], sensor[before], look[before]
+    for row, first in repeats.items():
+        for column in (t, arrived, sensor, look, z, sigma):
+            column[row] = column[first]
+        ids[row] = ids[first]
+        if first in full:
+            full[row] = full[first]
     return Detections(t, arrived, sensor, look, z, sigma, full, ids if any(ids) else None)

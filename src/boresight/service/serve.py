@@ -40,6 +40,7 @@ from boresight.types import FATES, Detections, Fate, Recording, Scan
 
 TELL = 1.0  # s between status lines on a terminal
 TELL_QUIETLY = 10.0  # s between them elsewhere
+NOT_LEFT = (Fate.UPDATED, Fate.INITIATED, Fate.NO_DETECTION)
 USED = [FATES.index(f) for f in (Fate.UPDATED, Fate.INITIATED)]
 
 
@@ -113,7 +114,7 @@ class Serving:
     def take(self, output: TrackOutput | ChainOutput) -> None:
         """Give one step's output to everything that wants it."""
         tracks = output.track if isinstance(output, ChainOutput) else output
-        self.duplicates += self.parts.decoder.duplicates
+        self.duplicates += [row for row, _ in self.parts.decoder.duplicates]
         self.parts.decoder.duplicates.clear()
         if self.results is not None:
             self.results.take(tracks)
@@ -249,6 +250,10 @@ class Stats:
                 one += f" delay {row['delay_s']:.1f}s"
             if "used_share" in row:
                 one += f" used {100 * row['used_share']:.0f}%"
+                others = {k: v for k, v in row["fates"].items() if k not in NOT_LEFT}
+                if others and row["used_share"] < 0.95:
+                    most = max(others, key=lambda k: others[k])
+                    one += f" ({most} {100 * others[most] / sum(row['fates'].values()):.0f}%)"
             if "nis_mean" in row:
                 one += f" NIS {row['nis_mean']:.1f}"
             if "clock" in row:

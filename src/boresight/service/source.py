@@ -23,7 +23,7 @@ POLL = 0.005  # s between looks at inputs that cannot be waited for
 GATHER = 0.004  # s for which what arrives is gathered into one step
 MOST_LINES, MOST_BYTES = 50_000, 64 << 20  # that wait
 MOST_WAIT = 1.0  # s that raw data may wait
-PER_STEP = 400  # lines taken in one step: so long are sockets and ticks left alone
+PER_STEP, STEP_BYTES = 400, 1 << 17  # lines, bytes taken in one step: so long are sockets and ticks left alone
 IDLE = 0.5  # s without anything after which there is a tick all the same
 
 
@@ -182,10 +182,10 @@ class LiveSource:
         """Decode the oldest of what waits, up to so many lines, and log it as taken."""
         out: list[Item] = []
         self.arrived = self.waiting.data[0][1] if self.waiting.data else math.nan
-        lines = 0
-        while self.waiting.data and lines < PER_STEP:
+        lines = size = 0
+        while self.waiting.data and lines < PER_STEP and size < STEP_BYTES:
             source, t, data, n = self.waiting.take()
-            lines += n
+            lines, size = lines + n, size + len(data)
             if self.log is not None:
                 self.log.append(Kind.TAKEN, source, t, data)
             out += self.decoders[source].decode(data, t)
