@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from boresight.config.tracker import SENSOR_KEYS, read_tracker_config
