@@ -552,3 +552,32 @@ def test_the_pointer_follows_a_track_in_the_same_process(recording: Recording) -
     assert held >= 0
     assert np.degrees(np.median(errors)) < 1.5
     assert sum(p.mode == "fused" for p in late) > 0.9 * len(late)
+
+
+def test_the_example_tracks_a_boat_that_radar_and_ais_report() -> None:
+    from boresight.config.serve import read_service
+
+    parts = parts_of(read_service(Path(__file__).parents[2] / "examples" / "serve.toml"))
+    assert parts.chain is not None
+    state, rng, told = parts.chain.init(), np.random.default_rng(2), []
+    site = parts.service.declaration.site
+    from boresight.frames.local import geodetic_from_enu
+
+    for k in range(60):
+        now = 1e9 + k
+        e, n = 900.0 - 6.0 * k, 700.0 + 2.0 * k
+        r, azimuth = math.hypot(e, n) + 5.0 * rng.normal(), math.degrees(math.atan2(e, n)) + 0.5 * rng.normal()
+        lines = (
+            [{"sensor": "radar", "t_s": now, "detections": [{"range_m": r, "azimuth_deg": azimuth}]}] if k % 2 else []
+        )
+        if k % 6 == 3:
+            lat, lon, _ = geodetic_from_enu(e + 10.0 * rng.normal(), n + 10.0 * rng.normal(), 0.0, site)
+            place = {"latitude_deg": math.degrees(lat), "longitude_deg": math.degrees(lon)}
+            lines.append({"sensor": "ais", "t_s": now, "source_id": "211000001", **place})
+        items: list[Any] = [i for line in lines for i in parts.decoder.decode(json.dumps(line).encode(), now + 0.05)]
+        state, out = parts.chain.step(state, [*items, Tick(now + 0.1)])
+        told += [(rows, k) for rows in out.track.rows]
+    rows, k = told[-1]
+    assert len(set(rows.track_id.tolist())) == 1
+    assert np.hypot(rows.position[-1, 0] - (900.0 - 6.0 * k), rows.position[-1, 1] - (700.0 + 2.0 * k)) < 25.0
+    assert out.guide.pointings[-1].mode == "fused"
