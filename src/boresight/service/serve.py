@@ -151,6 +151,8 @@ class Serving:
         if self.saver is None or self.log is None or self.stats.state is None:
             return
         self.log.flush(now)
+        if self.log.error:  # the state would be ahead of what the log holds
+            return
         others = {"decoder": self.parts.decoder.saved(), "poses": self.parts.poses.saved()}
         self.saver.save(self.stats.state, self.log.place, others, wait)
 
