@@ -20,6 +20,10 @@ def new_log(folder: Path, site: str, settings: str, force: bool, about: LogTable
             raise UserError(f"{folder}: holds something else than a log; choose another folder")
         if inside and not force:
             raise UserError(f"{folder}: the log exists; give --force to replace it, or another folder")
+        ours = {MARKER, SITE, SETTINGS, NAME, *map(segment_name, segments_of(folder))}
+        others = sorted(p.name for p in folder.iterdir() if p.name not in ours and not p.name.startswith(f".{NAME}."))
+        if others:
+            raise UserError(f"{folder}: {holds_others(others)}")
         shutil.rmtree(folder)
     return create_log(folder, site, settings, about)
 
