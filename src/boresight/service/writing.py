@@ -8,7 +8,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from boresight.errors import UserError
-from boresight.io.livelog import LogTable, LogWriter, create_log, is_log
+from boresight.io.files import holds_others
+from boresight.io.livelog import (
+    MARKER,
+    SETTINGS,
+    SITE,
+    LogTable,
+    LogWriter,
+    create_log,
+    is_log,
+    segment_name,
+    segments_of,
+)
+from boresight.service.restart import NAME
 from boresight.service.sockets import Input
 
 
