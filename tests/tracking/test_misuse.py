@@ -60,7 +60,7 @@ def _wrong(scan: Scan) -> list[dict[str, Any]]:
     much = np.tile(np.eye(7), (n, 1, 1))
     much[:, 0, 1] = much[:, 1, 0] = 2.0
     infinite, behind = scan.z.copy(), scan.z.copy()
-    infinite[0, 1], behind[0, 0] = np.inf, -5.0
+    infinite[0, 1], behind[0, 0] = np.inf, -50.0
     return [
         {"sensor": 2},
         {"sensor": -1},

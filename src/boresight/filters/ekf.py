@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy import empty
@@ -110,14 +111,14 @@ def update(
     return _sane(state, GaussianState(state.t, x, P)), UpdateInfo(y, S, nis, log_likelihood)
 
 
-def _require(state: GaussianState) -> None:
+def _require(state: Any) -> None:
     """Raise UserError unless the state is a belief."""
     if not isinstance(state, GaussianState):
         raise UserError(f"the state must be a GaussianState, not {type(state).__name__}")
     check.state("the state", *state)
 
 
-def _fits(state: GaussianState, model: MotionModel | MeasurementModel) -> None:
+def _fits(state: Any, model: MotionModel | MeasurementModel) -> None:
     """Raise UserError unless the arrays of a state have the shapes that the model's kernels take without looking."""
     if not isinstance(state, GaussianState):
         _require(state)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from boresight.errors import UserError
 from boresight.frames.pose import PoseTrack
@@ -14,7 +15,15 @@ from boresight.tracking.config import TrackerConfig
 from boresight.types import N_COMPONENTS, Component, FloatArray, Scan, Sensor
 
 LATEST = 1e12  # s: no time is farther from zero than this
+NOISE = 6.0  # standard deviations
 SYMMETRIC = 1e-6  # of the variances, as rounding may leave a covariance
+RULES: tuple[tuple[str, Callable[[Any], bool], str], ...] = (
+    ("latency", lambda v: abs(v) < LATEST, "finite"),
+    ("period", lambda v: v is None or 0.0 < v < LATEST, "above zero, or None"),
+    ("p_detection", lambda v: 0.0 < v <= 1.0, "above 0 and at most 1"),
+    ("clutter_per_scan", lambda v: 0.0 <= v < LATEST, "finite and not negative"),
+    ("p_wrong_id", lambda v: v is None or 0.0 <= v <= 1.0, "within [0, 1], or None"),
+)
 COLUMNS = {"t": (), "z": (N_COMPONENTS,), "covariance": (N_COMPONENTS, N_COMPONENTS)}
 
 
@@ -48,13 +57,7 @@ def _sensor(sensor: Sensor) -> None:
     where, sigma = f"tracker: sensor '{sensor.id}'", sensor.sigma
     if not isinstance(sigma, np.ndarray) or sigma.shape != (N_COMPONENTS,) or sigma.dtype != np.float64:
         raise UserError(f"{where}: sigma must be an array of {N_COMPONENTS} float64")
-    for name, fits, rule in (
-        ("latency", lambda v: abs(v) < LATEST, "finite"),
-        ("period", lambda v: v is None or 0.0 < v < LATEST, "above zero, or None"),
-        ("p_detection", lambda v: 0.0 < v <= 1.0, "above 0 and at most 1"),
-        ("clutter_per_scan", lambda v: 0.0 <= v < LATEST, "finite and not negative"),
-        ("p_wrong_id", lambda v: v is None or 0.0 <= v <= 1.0, "within [0, 1], or None"),
-    ):
+    for name, fits, rule in RULES:
         value = getattr(sensor, name)
         try:
             good = fits(value)
@@ -96,14 +99,14 @@ def check_scans(scans: Sequence[Scan], sensors: int, arrival: float) -> None:
         arrival = scan.t_recv
 
 
-def _explain(scan: Scan, sensors: int, arrival: float) -> None:
+def _explain(scan: Any, sensors: int, arrival: float) -> None:
     """Raise the UserError that says what of a look is wrong."""
     if not isinstance(scan.sensor, int | np.integer) or not 0 <= scan.sensor < sensors:
         raise UserError(f"tracker: a look's sensor must be an index into its {sensors} sensors, not {scan.sensor!r}")
     where = f"tracker: a look of sensor {scan.sensor}"
     for name in ("t_look", "t_recv"):
-        value = getattr(scan, name)
-        if not isinstance(value, int | float | np.floating | np.integer) or not abs(value) < LATEST:
+        value: Any = getattr(scan, name)
+        if not isinstance(value, int | float | np.floating | np.integer) or not -LATEST < float(value) < LATEST:
             raise UserError(f"{where}: {name} must be a time in seconds, not {value!r}")
     if not scan.t_recv >= arrival:
         raise UserError(f"{where}: t_recv = {scan.t_recv!r} is before {arrival!r}, that of the look before")
@@ -124,13 +127,16 @@ def _explain(scan: Scan, sensors: int, arrival: float) -> None:
             raise UserError(f"{where}: {name} must have the shape {shape}, not {value.shape}")
 
 
-def check_detections(sensor: Any, t: FloatArray, z: FloatArray, R: FloatArray) -> None:
-    """Raise UserError unless detections (M,), each of the sensor with its index, have possible times, values, noise."""
+def check_detections(sensor: Any, t: FloatArray, z: FloatArray, R: FloatArray, sigma_range: FloatArray) -> None:
+    """Raise UserError unless detections (M,), each of the sensor with its index, have possible times, values, noise.
+
+    `sigma_range` (M,) is what each one's sensor declares (m), NaN for nothing.
+    """
     if not len(t):
         return
     measured = ~np.isnan(z)
     variance = np.diagonal(R, axis1=1, axis2=2)
-    fine = (np.abs(t) < LATEST).all() and not (z[:, Component.RANGE] < 0.0).any() and not np.isinf(z).any()
+    fine = (np.abs(t) < LATEST).all() and not _negative(z, R, sigma_range).any() and not np.isinf(z).any()
     fine = fine and bool((variance[measured] > 0.0).all())
     if fine:
         pairs = measured[:, :, None] & measured[:, None, :]
@@ -140,16 +146,23 @@ def check_detections(sensor: Any, t: FloatArray, z: FloatArray, R: FloatArray) -
         if fine:
             return
     for i in range(len(t)):
-        _detection(f"tracker: a look of sensor {int(sensor[i])}: detection {i}", t[i], z[i], R[i])
+        _detection(f"tracker: a look of sensor {int(sensor[i])}: detection {i}", t[i], z[i], R[i], sigma_range[i])
 
 
-def _detection(where: str, t: float, z: FloatArray, R: FloatArray) -> None:
+def _negative(z: FloatArray, R: FloatArray, sigma_range: FloatArray) -> NDArray[np.bool_]:
+    """Whether a range is negative beyond what noise explains, as it does beside the sensor."""
+    with np.errstate(invalid="ignore"):
+        sigma = np.fmax(sigma_range, np.sqrt(R[..., Component.RANGE, Component.RANGE]))
+        return np.asarray(z[..., Component.RANGE] < -NOISE * sigma)
+
+
+def _detection(where: str, t: float, z: FloatArray, R: FloatArray, sigma_range: FloatArray) -> None:
     if not abs(t) < LATEST:
         raise UserError(f"{where}: t must be a time in seconds, not {float(t)!r}")
     seen = np.flatnonzero(~np.isnan(z))
     for c in seen:
         name = Component(int(c)).name.lower()
-        if np.isinf(z[c]) or (c == Component.RANGE and z[c] < 0.0):
+        if np.isinf(z[c]) or (c == Component.RANGE and _negative(z, R, sigma_range)):
             raise UserError(f"{where}: {name} = {float(z[c])!r}; NaN says that it was not measured")
         if not 0.0 < R[c, c] < np.inf:
             raise UserError(f"{where}: the variance of {name} must be above zero and finite, not {float(R[c, c])!r}")

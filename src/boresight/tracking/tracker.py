@@ -20,7 +20,7 @@ from boresight.tracking.names import Names
 from boresight.tracking.output import Decisions, Rows, decisions_of, rows_of, unseen
 from boresight.tracking.scan_check import LATEST, check_detections, check_scans, check_setup
 from boresight.tracking.window import Window, empty_window, take, what_became
-from boresight.types import NO_TRACK, Fate, FloatArray, Reporting, Scan, Sensor, addresses_of
+from boresight.types import NO_TRACK, Component, Fate, FloatArray, Reporting, Scan, Sensor, addresses_of
 
 REASON = {
     Fate.UNASSOCIATED: "no track took it, and it begins none",
@@ -245,7 +245,8 @@ class Tracker:
             velocity=np.zeros((len(t) + len(scans), 3)),
             axes=np.zeros((len(t) + len(scans), 3, 3)),
         )
-        check_detections(np.repeat(sensor, count), t, looks.z, looks.R)
+        sigma_range = np.array([s.sigma[Component.RANGE] for s in self.sensors])[sensor]
+        check_detections(np.repeat(sensor, count), t, looks.z, looks.R, np.repeat(sigma_range, count))
         for i in np.unique(sensor):
             self._place(looks, np.flatnonzero(sensor == i), t)
         return looks
