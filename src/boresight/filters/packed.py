@@ -87,7 +87,7 @@ def _require(motion: Any, sensors: Sequence[Any]) -> None:
 def pack(state: GaussianState, motion: NearlyConstantVelocity) -> FloatArray:
     """Return the packed belief (29,) of a state of 6 components; raises UserError where `fits` is false."""
     _require(motion, ())
-    check.state("the state to pack", *state, size=6)
+    check.state("the state to pack, of 6 components", *state, size=6)
     b = np.empty(BELIEF_SIZE)
     b[TIME], b[POWER] = state.t, motion.q
     b[NUMBERS:] = _numbers(state.x[None], state.P[None])[0]
