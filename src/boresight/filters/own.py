@@ -61,7 +61,9 @@ def models(motion: KernelMotion, sensor: KernelSensor | OwnSensor) -> Models:
 
 def pack(state: GaussianState, motion: KernelMotion) -> FloatArray:
     """Return the packed belief (43 and the motion's parameters): time, mean, covariance, parameters."""
-    check.state("the state to pack (this filter is for six; take filters.stream for others)", *state, size=N)
+    if np.shape(state.x) != (N,):
+        raise UserError(f"this filter is for {N} states, not {np.size(state.x)}: take filters.stream")
+    check.state("the state to pack", *state, size=N)
     return np.concatenate(([state.t], state.x, state.P.ravel(), motion.parameters))
 
 
