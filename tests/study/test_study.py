@@ -126,6 +126,15 @@ def test_mistakes_show_before_the_first_run(tmp_path: Path, run: Run) -> None:
     assert (tmp_path / "mine" / "letter.txt").exists()
 
 
+def test_a_study_never_deletes_its_own_plan(tmp_path: Path, run: Run) -> None:
+    plan = small(tmp_path)
+    (tmp_path / JOURNAL).write_text("{}\n", encoding="utf-8")  # whatever lies there
+    done = run("study", plan, "-o", plan.parent, "--force")
+    assert done.code == 2
+    assert "did not write" in done.err
+    assert plan.exists()
+
+
 def test_a_torn_journal_goes_on_and_another_study_is_refused(tmp_path: Path) -> None:
     with Journal(tmp_path, "one") as journal:
         journal.add({"a": 0.1})

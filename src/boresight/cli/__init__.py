@@ -62,7 +62,9 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     except OSError as error:  # files are written by io.files, which says which; what is left is standard output
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO) or error.filename is not None:
+        if error.filename is not None:
+            _usage(f"{error.filename}: {(error.strerror or str(error)).lower()}")
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
             raise
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         _usage(f"standard output cannot be written ({(error.strerror or str(error)).lower()})")

@@ -61,7 +61,7 @@ def demo(
         from boresight.errors import UserError
 
         raise UserError("--runs must be 2 or more, --seed 0 or more")
-    with output_folder(output, force) as folder:
+    with output_folder(output, force, beside=("recording", "scenario.toml")) as folder:
         with compiling_beside(DIMENSIONS) as compiles:
             if compiles:
                 _say(json, "compiling kernels beside, on the first run only (about a minute) …")

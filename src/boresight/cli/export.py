@@ -62,7 +62,7 @@ def _recording(log: Path, output: Path | None, force: bool) -> None:
         raise UserError("--to recording needs -o FOLDER")
     if not is_log(log):
         raise UserError(f"{log}: is not the log of a live run (boresight serve --log)")
-    check_output(output, force, RECORDING, inputs=[log])
+    check_output(output, force, RECORDING, [log], [SETTINGS])
     recording = read_recording(log)
     write_recording(recording, output, force, extras={SETTINGS: read_text(log / SETTINGS)})
     print(f"wrote {output}: {len(recording.detections)} rows of {len(recording.sensors)} sensors")

@@ -40,7 +40,7 @@ def autoferry(
     """
     from boresight.io.autoferry import TRACKER_TOML, import_autoferry
 
-    check_output(output, force, RECORDING, [detections, truth, ignore])
+    check_output(output, force, RECORDING, [detections, truth, ignore], ["tracker.toml"])
     _finish(import_autoferry(detections, truth, ignore), output, force, {"tracker.toml": TRACKER_TOML})
 
 

@@ -77,7 +77,7 @@ def register(
         Print one JSON object instead of a table.
     """
     if output is not None:
-        check_output(output, force, RECORDING, [rec, config])
+        check_output(output, force, RECORDING, [rec, config], [BESIDE] if (rec / BESIDE).is_file() else [])
     recording = read_recording(rec)
     ids = sensor_ids(recording, sensors)
     known = [s.id for s in recording.sensors]

@@ -14,6 +14,9 @@ from cyclopts import Parameter
 
 from boresight.cli.output import print_json, print_table
 from boresight.errors import UserError
+from boresight.io.files import holds_others, reason
+
+WRITTEN = ("runs.parquet", "cells.parquet", "study.png", "summary.json")  # beside the journal
 
 
 def study(
@@ -57,7 +60,10 @@ def study(
     checked = read_study(plan, runs)
     folder = output if output is not None else Path(f"{plan.stem}-results")
     rows = _run(checked, folder, engine, workers or cores(), force)
-    table = _finish(checked, folder, rows)
+    try:
+        table = _finish(checked, folder, rows)
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be written ({reason(error)}); the runs are kept") from None
     if json:
         parameters = {"plan": str(plan), "output": str(folder), "engine": engine, "seed": checked.seed}
         print_json("study", {**parameters, "runs": checked.runs, "keys": list(checked.keys)}, table)
@@ -82,10 +88,13 @@ def _run(checked: Any, folder: Path, engine: str, workers: int, force: bool) -> 
 
     if folder.exists() and not folder.is_dir():
         raise UserError(f"{folder}: exists and is not a folder; choose another output folder")
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / JOURNAL).exists():
-        raise UserError(f"{folder}: holds files that this command did not write; choose another output folder")
-    if force and folder.is_dir():
-        shutil.rmtree(folder)
+    if folder.is_dir():
+        inside = {p.name for p in folder.iterdir()}
+        foreign = sorted(inside - {JOURNAL, *WRITTEN} - {f".{name}" for name in WRITTEN})
+        if foreign or (inside and JOURNAL not in inside):
+            raise UserError(f"{folder}: {holds_others(foreign or sorted(inside))}")
+        if force:
+            shutil.rmtree(folder)
     with Journal(folder, checked.fingerprint()) as journal:
         done = {(r["cell"], r["run"]) for r in journal.rows}
         wanted = [(c, r) for r in range(checked.runs) for c in range(len(checked.cells)) if (c, r) not in done]

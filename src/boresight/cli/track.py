@@ -97,10 +97,7 @@ def track(
     results.summary["heights_not_observed"], results.summary["covariances_refuted"] = heights, refuted
     with output_folder(output, force) as folder:
         write_results(results, recording, folder)
-    if report:  # once the results are safe
-        from boresight.report.html import write_report
-
-        write_report(output / "report.html", results, recording)
+    failed = _report(output, results, recording) if report else ""  # once the results are safe
     print_notes([*loss_lines(recording, results.decisions), *heights, *refuted])
     counts = results.summary["counts"]
     row = {"output": str(output), **counts, "seconds": results.summary["seconds"]}
@@ -115,6 +112,21 @@ def track(
             print(line)
         for c in results.summary.get("registration", []):
             print(f"{c['sensor']}: {c['parameter']} {c['value']:.3g} ± {c['sigma']:.2g} (1σ): {c['verdict']}")
+    if failed:
+        print(f"boresight: {failed}", file=sys.stderr)
+        sys.exit(1)
+
+
+def _report(output: Path, results: Results, recording: Recording) -> str:
+    """Write the report; returns in words why it could not be written, empty if it was."""
+    try:
+        from boresight.report.html import write_report
+
+        write_report(output / "report.html", results, recording)
+    except Exception as error:  # whatever it is, the tracks are there
+        words = str(error) if isinstance(error, UserError) else f"{type(error).__name__}: {error}"
+        return f"no report ({' '.join(words.split())}); the tracks are in {output}"
+    return ""
 
 
 def _told_of(recording: Recording, results: Results, ids: list[str] | None) -> tuple[list[str], list[str]]:

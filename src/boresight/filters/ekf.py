@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy import empty
@@ -10,6 +11,7 @@ from numpy import empty
 from boresight.errors import UserError
 from boresight.kernels.gaussian import joseph_update, sandwich
 from boresight.kernels.motion import move
+from boresight.kernels.observation import DIMENSIONS
 from boresight.kernels.space import predict_space, update_space
 from boresight.kernels.step import predict_step, update_step
 from boresight.models import check
@@ -21,6 +23,7 @@ from boresight.types.sensor import FloatArray
 from boresight.types.state import GaussianState, UpdateInfo
 
 SQUARE = (6, 6)
+DOUBLE = np.dtype(np.float64)
 new = tuple.__new__  # of a named tuple, without the detour through its own
 NOTHING = "the measurement has no component that can be used: nothing measured, or zero range"
 
@@ -41,21 +44,29 @@ def predict(state: GaussianState, motion: MotionModel, t: float) -> GaussianStat
 
     Raises UserError where `t` is not finite or before the state's time: late reports are for `filters.late`.
     """
-    dt = t - state.t
-    if not 0.0 <= dt < math.inf:
+    try:
+        dt = t - state.t
+        if not -math.inf < dt < math.inf:
+            raise TypeError
+    except (TypeError, ValueError, AttributeError):
+        _require(state)
+        raise UserError(f"predict: t must be a time in seconds, not {t!r}") from None
+    if not dt >= 0.0:
         raise UserError(f"cannot predict from t = {state.t!r} to t = {t!r}: time must not run backwards")
     if type(motion) is NearlyConstantVelocity and motion.dimensions == 3:
         x, P = empty(6), empty(SQUARE)
         if predict_space(state.x, state.P, dt, motion.q, x, P):  # False: other arrays, the way for all
             return new(GaussianState, (float(t), x, P))
-    if isinstance(motion, KernelMotion) and motion.kernel is move and len(state.x) == motion.state_dimension:
-        return GaussianState(float(t), *predict_step(state.x, state.P, dt, motion.parameters))
+        _require(state)
+    _fits(state, motion)
+    if isinstance(motion, KernelMotion) and motion.kernel is move:
+        return _sane(state, GaussianState(float(t), *predict_step(state.x, state.P, dt, motion.parameters)))
     if isinstance(motion, KernelMotion):
         x, F, Q = motion.move(state.x, dt)
     else:
         x, F, Q = motion.transition(state.x, dt), motion.F(state.x, dt), motion.Q(state.x, dt)
     P = sandwich(np.ascontiguousarray(F, dtype=float), state.P, np.ascontiguousarray(Q, dtype=float))
-    return GaussianState(float(t), x, P)
+    return _sane(state, GaussianState(float(t), x, P))
 
 
 def update(
@@ -71,6 +82,8 @@ def update(
     States from `n_estimated` on are considered (Schmidt): they widen the covariance but are not estimated.
     Raises UserError where the report holds no component that can be used, or S is not positive definite.
     """
+    if type(state) is not GaussianState:
+        _require(state)
     if n_estimated is None and isinstance(sensor, KernelSensor) and sensor.separable:  # the straight-line kernel
         m = len(sensor.components)
         x, P, y, S = empty(6), empty(SQUARE), empty(m), empty((m, m))
@@ -79,7 +92,12 @@ def update(
             if used < m:
                 y, S = y[:used], S[:used, :used]
             return new(GaussianState, (state.t, x, P)), new(UpdateInfo, (y, S, nis, log_likelihood))
+        if used < 0:
+            _require(state)
+    _fits(state, sensor)
     n = len(state.x) if n_estimated is None else n_estimated
+    if not isinstance(n, int | np.integer) or not 0 <= n <= len(state.x):
+        raise UserError(f"update: n_estimated must be 0 to {len(state.x)}, the number of states, not {n_estimated!r}")
     if isinstance(sensor, KernelSensor):
         x, P, y, S, nis, log_likelihood = update_step(state.x, state.P, sensor.columns(z), sensor.context, n)
         if not len(y):
@@ -88,8 +106,43 @@ def update(
         y, H, R = linearised(sensor, z, state.x)
         x, P, S, nis, log_likelihood = joseph_update(state.x, state.P, y, H, R, n)
     if math.isnan(nis):
+        _require(state)
         raise UserError("the innovation covariance is not positive definite: check the prior and the sensor's noise")
-    return GaussianState(state.t, x, P), UpdateInfo(y, S, nis, log_likelihood)
+    return _sane(state, GaussianState(state.t, x, P)), UpdateInfo(y, S, nis, log_likelihood)
+
+
+def _require(state: Any) -> None:
+    """Raise UserError unless the state is a belief."""
+    if not isinstance(state, GaussianState):
+        raise UserError(f"the state must be a GaussianState, not {type(state).__name__}")
+    check.state("the state", *state)
+
+
+def _fits(state: Any, model: MotionModel | MeasurementModel) -> None:
+    """Raise UserError unless the arrays of a state have the shapes that the model's kernels take without looking."""
+    if not isinstance(state, GaussianState):
+        _require(state)
+    x, P = state.x, state.P
+    if not isinstance(x, np.ndarray) or not isinstance(P, np.ndarray) or x.ndim != 1 or P.shape != (len(x), len(x)):
+        _require(state)
+    if x.dtype != DOUBLE or P.dtype != DOUBLE:
+        _require(state)
+    if isinstance(model, KernelMotion):
+        if len(x) != model.state_dimension:
+            raise UserError(f"the state has {len(x)} components, the motion model {model.state_dimension}")
+    elif isinstance(model, KernelSensor):
+        if len(x) < 2 * int(model.context[DIMENSIONS]):
+            raise UserError(f"the state has {len(x)} components; the sensor wants position and velocity")
+    elif not (hasattr(model, "transition") or hasattr(model, "innovation")):
+        raise UserError(f"{type(model).__name__} is no motion or measurement model")
+
+
+def _sane(before: GaussianState, after: GaussianState) -> GaussianState:
+    """Return `after`; raises UserError where it is no belief, because that before was none."""
+    if not float(after.P.diagonal().min()) >= 0.0 or not math.isfinite(float(after.x.sum())):
+        _require(before)
+        raise UserError("the filter gives a covariance that is not positive: check the prior and the noise")
+    return after
 
 
 def linearised(sensor: MeasurementModel, z: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from boresight.errors import UserError
-from boresight.filters.packed import NOT_PACKED, Table
+from boresight.filters.packed import NOT_PACKED, Table, require_table, times_of
 from boresight.kernels import config
 from boresight.kernels.address import address_of
 from boresight.kernels.own import (
@@ -28,6 +28,7 @@ from boresight.kernels.own import (
     own_stream,
 )
 from boresight.kernels.signatures import MOTION, OBSERVATION
+from boresight.models import check
 from boresight.models.base import KernelSensor
 from boresight.models.motion.base import KernelMotion
 from boresight.models.own import OwnSensor
@@ -60,8 +61,9 @@ def models(motion: KernelMotion, sensor: KernelSensor | OwnSensor) -> Models:
 
 def pack(state: GaussianState, motion: KernelMotion) -> FloatArray:
     """Return the packed belief (43 and the motion's parameters): time, mean, covariance, parameters."""
-    if state.x.shape != (N,):
-        raise UserError(f"this filter is for {N} states, not {len(state.x)}: take filters.stream")
+    if np.shape(state.x) != (N,):
+        raise UserError(f"this filter is for {N} states, not {np.size(state.x)}: take filters.stream")
+    check.state("the state to pack", *state, size=N)
     return np.concatenate(([state.t], state.x, state.P.ravel(), motion.parameters))
 
 
@@ -90,7 +92,7 @@ def table(t: Sequence[float] | FloatArray, sensors: Sequence[Any], z: Sequence[F
     rows = {key: i for i, key in enumerate(different)}
     which = np.array([rows[id(s)] for s in sensors], dtype=np.int64)
     columns = np.array([s.columns(row) for s, row in zip(sensors, z)])
-    return Table(np.array(t, dtype=float), columns, np.array([s.context for s in different.values()]), which)
+    return Table(times_of(t), columns, np.array([s.context for s in different.values()]), which)
 
 
 def step(belief: FloatArray, report: FloatArray, motion: int, observe: int) -> float:
@@ -109,6 +111,11 @@ def run(
     belief: FloatArray, used: Models, reports: Table, kept: FloatArray = NONE_KEPT, nis: FloatArray = NO_NIS
 ) -> None:
     """Filter a whole stream in place; `kept` (k, 42), unless empty, gets mean and covariance. As `packed.run`."""
+    if not isinstance(used, Models):
+        raise UserError("run: the models must be what filters.own.models gives")
+    require_table(belief, reports, kept, nis, None, None)
+    if len(belief) < PARAMETERS:
+        raise UserError(f"run: the belief must hold {PARAMETERS} numbers and the motion's parameters: take pack")
     done = own_stream(belief, used.motion, used.observe, *reports, kept, nis)
     if done < len(reports.t):
         raise UserError(

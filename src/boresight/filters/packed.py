@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from boresight.errors import UserError
 from boresight.kernels import tiles
+from boresight.kernels.observation import CONTEXT_SIZE
 from boresight.kernels.packed import (
     BELIEF_SIZE,
     CONTEXT,
@@ -30,6 +31,7 @@ from boresight.kernels.packed import (
     packed_step,
 )
 from boresight.kernels.packed import packed_stream as _stream
+from boresight.models import check
 from boresight.models.base import KernelSensor
 from boresight.models.motion import NearlyConstantVelocity
 from boresight.types.sensor import FloatArray
@@ -85,8 +87,7 @@ def _require(motion: Any, sensors: Sequence[Any]) -> None:
 def pack(state: GaussianState, motion: NearlyConstantVelocity) -> FloatArray:
     """Return the packed belief (29,) of a state of 6 components; raises UserError where `fits` is false."""
     _require(motion, ())
-    if state.x.shape != (6,):
-        raise UserError(f"a packed belief has 6 components, not {len(state.x)}")
+    check.state("the state to pack, of 6 components", *state, size=6)
     b = np.empty(BELIEF_SIZE)
     b[TIME], b[POWER] = state.t, motion.q
     b[NUMBERS:] = _numbers(state.x[None], state.P[None])[0]
@@ -139,7 +140,18 @@ def table(t: Sequence[float] | FloatArray, sensors: Sequence[KernelSensor], z: S
     if not len(t) == len(sensors) == len(z) or not len(t):
         raise UserError("give one time, one sensor and one measurement per report, and at least one report")
     contexts, which = schedule(sensors)
-    return Table(np.array(t, dtype=float), np.array([s.columns(row) for s, row in zip(sensors, z)]), contexts, which)
+    return Table(times_of(t), np.array([s.columns(row) for s, row in zip(sensors, z)]), contexts, which)
+
+
+def times_of(t: Sequence[float] | FloatArray) -> FloatArray:
+    """Return times (k,) as an array; raises UserError where they are no finite numbers."""
+    try:
+        times: FloatArray = np.array(t, dtype=float)
+    except (TypeError, ValueError):
+        raise UserError("the reports' times must be numbers (s)") from None
+    if times.shape != (len(t),) or not np.isfinite(times).all():
+        raise UserError("the reports' times must be finite numbers (s)")
+    return times
 
 
 def schedule(sensors: Sequence[KernelSensor]) -> tuple[FloatArray, NDArray[np.int64]]:
@@ -173,12 +185,42 @@ def run(belief: FloatArray, reports: Table, kept: FloatArray = NONE_KEPT, nis: F
     Filled unless they are empty: `kept` (k, 27) with the numbers of the belief after every report (see
     kernels.blocks), `nis` (k,). Raises UserError where time runs backwards or an innovation variance is not positive.
     """
+    require_table(belief, reports, kept, nis, BELIEF_SIZE, CONTEXT_SIZE)
     done = _stream(belief, *reports, kept, nis)
     if done < len(reports.t):
         raise UserError(
             f"the filter cannot go past report {done} at t = {reports.t[done]!r}: it is before the one before, or the "
             "innovation covariance is not positive definite (check the prior and the noise)"
         )
+
+
+def require_table(
+    belief: FloatArray, reports: Table, kept: FloatArray, nis: FloatArray, size: int | None, context: int | None
+) -> None:
+    """Raise UserError unless the arrays of a stream fit each other; `size` and `context` are lengths (None: any)."""
+    arrays = {"belief": belief, "kept": kept, "nis": nis, **reports._asdict()}
+    for name, array in arrays.items():
+        kind = np.int64 if name == "sensor" else np.float64
+        if not isinstance(array, np.ndarray) or array.dtype != kind:
+            raise UserError(f"run: {name} must be an array of {np.dtype(kind)}: take what pack and table make")
+    k = len(reports.t)
+    numbers = 27 if size is not None else 42
+    fits = (
+        belief.ndim == 1
+        and (size is None or len(belief) == size)
+        and belief.flags.writeable
+        and reports.t.shape == (k,)
+        and reports.z.shape == (k, 7)
+        and reports.sensor.shape == (k,)
+        and reports.contexts.ndim == 2
+        and (context is None or reports.contexts.shape[1] == context)
+        and (kept.size == 0 or kept.shape == (k, numbers))
+        and (nis.size == 0 or nis.shape == (k,))
+    )
+    if not fits:
+        raise UserError(f"run: arrays of other shapes than pack and table make, or kept is not ({k}, {numbers})")
+    if k and not (reports.sensor.min() >= 0 and reports.sensor.max() < len(reports.contexts)):
+        raise UserError(f"run: sensor holds an index outside the {len(reports.contexts)} contexts")
 
 
 def run_many(
@@ -225,9 +267,11 @@ def run_many(
 def checked(t0: float, x0: FloatArray, t: FloatArray, sensors: Sequence[KernelSensor], z: Sequence[FloatArray]) -> None:
     """Raise UserError unless there is one sensor and one (N, m) per time, and times do not run backwards."""
     n, k = len(x0), len(t)
+    if np.shape(x0) != (n, 6) or not np.isfinite(np.asarray(x0, dtype=float)).all() or not np.isfinite(t0):
+        raise UserError(f"the tracks' states must be finite and of shape (N, 6), not {np.shape(x0)}, at a finite time")
     if not len(sensors) == len(z) == k or not k or not n:
         raise UserError("give one sensor and one set of measurements per time, at least one time and one track")
-    if not np.all(np.diff(t, prepend=t0) >= 0.0):
+    if not np.all(np.diff(t, prepend=t0) >= 0.0) or not np.isfinite(t).all():
         raise UserError("the reports' times must be finite, and none before t0 or the one before it")
     if any(np.shape(row) != (n, s.dimension) for s, row in zip(sensors, z)):
         raise UserError(f"measurements must be (N, m) with N = {n} tracks and m the components of the report's sensor")
@@ -243,6 +287,13 @@ def layout(x0: FloatArray, P0: FloatArray, z: Sequence[FloatArray]) -> tuple[Flo
     """Return the beliefs (m, 27·WIDTH) and measurements (m, k, c·WIDTH) of N tracks as `kernels.tiles` has them."""
     n, width = len(x0), tiles.WIDTH
     m = -(-n // width)
+    priors = np.asarray(P0, dtype=float)
+    if priors.shape not in ((6, 6), (n, 6, 6)):
+        raise UserError(f"the tracks' covariances must have the shape (6, 6) or (N, 6, 6), not {priors.shape}")
+    variance = np.diagonal(priors, axis1=-2, axis2=-1)
+    tolerance = 1e-6 * np.sqrt(np.abs(variance[..., :, None] * variance[..., None, :]))
+    if not (variance >= 0.0).all() or not (np.abs(priors - np.swapaxes(priors, -1, -2)) <= tolerance).all():
+        raise UserError("the tracks' covariances must be finite and symmetric, without negative variances")
     b = _numbers(np.asarray(x0, dtype=float), np.broadcast_to(P0, (n, 6, 6)))
     measured = np.full((m, len(z), max(row.shape[1] for row in z) * width), np.nan)
     for i, row in enumerate(z):

@@ -11,6 +11,7 @@ from boresight.errors import UserError
 from boresight.kernels import smoothing
 from boresight.kernels.observation import observe
 from boresight.kernels.packed import UNFIT, space_stream
+from boresight.models import check
 from boresight.models.base import KernelSensor
 from boresight.models.motion.base import KernelMotion
 from boresight.models.motion.cv import NearlyConstantVelocity
@@ -54,8 +55,11 @@ def stack(t: Sequence[float] | FloatArray, sensors: Sequence[KernelSensor], z: S
     kernels = {id(s.kernel): s.kernel for s in sensors}
     if len(kernels) > 1:
         raise UserError("a stream needs one observation kernel: let it call the others, by a code in its context")
-    times = np.array(t, dtype=float)
-    if not np.all(np.diff(times) >= 0.0):
+    try:
+        times = np.array(t, dtype=float)
+    except (TypeError, ValueError):
+        raise UserError("the reports' times must be numbers (s)") from None
+    if times.shape != (len(t),) or not np.isfinite(times).all() or not np.all(np.diff(times) >= 0.0):
         raise UserError("the reports' times must be finite and must not run backwards: sort them, or use filters.late")
     columns = np.array([s.columns(row) for s, row in zip(sensors, z)])
     return Reports(times, columns, np.array([s.context for s in sensors]), next(iter(kernels.values())))
@@ -67,6 +71,9 @@ def run(state: GaussianState, motion: KernelMotion, reports: Reports, iterations
     Raises UserError where the first report is before the state, or the filter cannot go on (S not positive definite).
     """
     k, n = len(reports.t), motion.state_dimension
+    check.state("the state before the stream", *state, size=n)
+    if np.shape(reports.z) != (k, 7) or np.ndim(reports.context) != 2 or len(reports.context) != k:
+        raise UserError("run: reports of other shapes than stack makes")
     x, P, xp, Pp, F = np.empty((k, n)), np.empty((k, n, n)), np.empty((k, n)), np.empty((k, n, n)), np.empty((k, n, n))
     nis, done = np.zeros((k, 2)), UNFIT
     in_space = type(motion) is NearlyConstantVelocity and motion.dimensions == 3 and state.x.shape == (6,)

@@ -111,7 +111,7 @@ def write_recording(
 
     `extras` are further text files by name, such as the tracker.toml that suits the recording's sensors.
     """
-    with output_folder(path, force, RECORDING) as folder:
+    with output_folder(path, force, RECORDING, beside=extras or ()) as folder:
         declared = Declaration(recording.name, recording.dimensions, recording.site, recording.sensors)
         (folder / "recording.toml").write_text(write_declaration(declared), encoding="utf-8")
         columns = det.columns_of(recording.detections, recording.sensors)

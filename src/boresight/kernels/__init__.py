@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import hashlib
 import os
 import shutil
@@ -58,7 +59,7 @@ def _drop_stale(probe: Any) -> None:
     stamp = hashlib.sha256(repr(files).encode()).hexdigest()
     folder = Path(probe._cache.cache_path)
     note = folder / "kernels.stamp"
-    if note.is_file() and note.read_text() == stamp:
+    if note.is_file() and note.read_bytes() == stamp.encode():
         return
     folder.mkdir(parents=True, exist_ok=True)
     for index in folder.glob("*.nbi"):
@@ -68,10 +69,57 @@ def _drop_stale(probe: Any) -> None:
     fresh.replace(note)
 
 
+def _heal() -> None:
+    """Make Numba take a kernel that lies damaged in the cache as one that is not there, and go on where it cannot save.
+
+    A run that is killed or a disk that is full leaves files cut short; Numba would raise whatever unpickling them does.
+    """
+    from numba.core import caching
+
+    cache: Any = caching.Cache
+    load, save = cache.load_overload, cache.save_overload
+    told: list[str] = []
+
+    def load_overload(self: Any, sig: Any, context: Any) -> Any:
+        try:
+            return load(self, sig, context)
+        except Exception:
+            if not _ours(self):
+                raise
+            with contextlib.suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self: Any, sig: Any, data: Any) -> None:
+        try:
+            try:
+                save(self, sig, data)
+            except OSError:
+                raise
+            except Exception:  # of the index that it adds to
+                if not _ours(self):
+                    raise
+                self.flush()
+                save(self, sig, data)
+        except OSError as error:
+            if not _ours(self):
+                raise
+            if not told:
+                told.append(str(error.strerror or error).lower())
+                print(f"boresight: compiled kernels cannot be kept ({told[0]})", file=sys.stderr, flush=True)
+
+    cache.load_overload, cache.save_overload = load_overload, save_overload
+
+
+def _ours(cache: Any) -> bool:
+    return str(getattr(cache._py_func, "__module__", "")).startswith("boresight.")
+
+
 def _remove(folder: str, owner: int) -> None:
     if os.getpid() == owner:  # not in a forked child
         shutil.rmtree(folder, ignore_errors=True)
 
 
 if not config.DISABLE_JIT:
+    _heal()
     _ensure_cache()

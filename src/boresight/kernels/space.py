@@ -49,14 +49,28 @@ def store_dense(x: FloatArray, P: FloatArray, p: Three, v: Three, A: Six, B: Nin
             P[i, 3 + j] = P[3 + j, i] = B[3 * i + j]
 
 
+@njit(**INLINE)
+def sound(x: FloatArray, P: FloatArray) -> bool:
+    """Whether a mean (6,) is finite and a covariance (6, 6) symmetric to rounding, with variances above zero."""
+    for i in range(6):
+        if not (-math.inf < x[i] < math.inf and 0.0 < P[i, i] < math.inf):
+            return False
+        for j in range(i):
+            if not abs(P[i, j] - P[j, i]) <= 1e-9 * (P[i, i] + P[j, j]):
+                return False
+    return True
+
+
 @njit(types.boolean(THING, THING, types.float64, types.float64, THING, THING), **FAST)
 def _predict_space(x: Any, P: Any, dt: float, q: float, moved: Any, spread: Any) -> bool:
     """Move by `dt` (s) at nearly constant velocity, q in m²/s³: `moved` (6,) and `spread` (6, 6) are filled.
 
-    Returns False, with nothing done, where an array has another size or type.
+    Returns False, with nothing done, where an array has another size or type, or x and P are no belief.
     """
     x, P, moved, spread = vector(x), matrix(P), vector(moved), matrix(spread)
     if not (x.shape[0] == 6 and P.shape == (6, 6) and moved.shape[0] == 6 and spread.shape == (6, 6)):
+        return False
+    if not sound(x, P):
         return False
     p, v, A, B, C = load_dense(x, P)
     p, v, A, B, C = move(p, v, A, B, C, dt, q)
@@ -112,7 +126,8 @@ def _update_space(
 
     `mean` (6,), `covariance` (6, 6), `y` (m,) and `S` (m, m) are filled; caller and context must agree on m. Returns
     how many components were used (the first so many of y and S are filled; MISFIT where an array has another size or
-    type), the normalised innovation squared (NaN where S is not positive definite) and log N(y; 0, S).
+    type, or holds what cannot be), the normalised innovation squared (NaN where S is not positive definite) and
+    log N(y; 0, S).
     """
     x, P, z, context = vector(x), matrix(P), vector(z), vector(context)
     mean, covariance, y, S = vector(mean), matrix(covariance), vector(y), matrix(S)
@@ -121,6 +136,11 @@ def _update_space(
         return MISFIT, 0.0, 0.0
     if not (context.shape[0] == CONTEXT_SIZE and 0 < size <= 6 and y.shape[0] == size and S.shape == (size, size)):
         return MISFIT, 0.0, 0.0
+    if not sound(x, P):
+        return MISFIT, 0.0, 0.0
+    for i in range(size):
+        if math.isinf(z[i]) or (i == 0 and z[0] < 0.0 and context[NOISE] > 0.0):
+            return MISFIT, 0.0, 0.0
     H = np.empty((6, 8))
     p, v, A, B, C = load_dense(x, P)
     m = slopes(p, v, z, context, H)
@@ -140,6 +160,8 @@ def _update_space(
         p, v, A, B, C, part, s = condition_rate(p, v, A, B, C, here, speed, h, g, H[i, 7], H[i, 6])
         nis += part
         det *= s
+    if not (A[0] > 0.0 and A[3] > 0.0 and A[5] > 0.0 and C[0] > 0.0 and C[3] > 0.0 and C[5] > 0.0):
+        return MISFIT, 0.0, 0.0
     store_dense(mean, covariance, p, v, A, B, C)
     return m, nis, -0.5 * (nis + math.log(det) + m * math.log(2.0 * math.pi))
 

@@ -82,7 +82,12 @@ class KernelSensor:
             names = ", ".join(c.name.lower() for c in self.components)
             raise UserError(f"the measurement must hold {names}: shape ({self.dimension},), not {np.shape(z)}")
         out = NOT_MEASURED.copy()
-        out[list(self.components)] = z
+        try:
+            out[list(self.components)] = z
+        except (TypeError, ValueError):
+            raise UserError(f"the measurement must be numbers, not {z!r}") from None
+        if out[Component.RANGE] < 0.0 or np.isinf(out).any():
+            raise UserError(f"the measurement holds an infinite number or a negative range: {z!r}")
         return out
 
     def linearise(self, z: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:

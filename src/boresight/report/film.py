@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from boresight.errors import UserError
+from boresight.io.files import PART
 from boresight.report.scene import Scene
 
 SENSOR_COLOURS = ("#c4452f", "#2a7f9e", "#7a5195", "#3d8b37", "#b8860b", "#5c6b7a", "#a0527a", "#00796b")
@@ -37,10 +38,14 @@ def film(
     """Write frames at `times` (s) to `path`; returns the files. Raises UserError when it cannot be written."""
     pictures = _pictures(scene, times, tick)
     try:
-        if path.suffix == ".gif":
-            return [_gif(pictures, path, fps)]
-        if path.suffix == ".mp4":
-            return [_mp4(pictures, path, fps)]
+        if path.suffix in (".gif", ".mp4"):  # whole or not there
+            part = path.with_name(f".{path.stem}{PART}{path.suffix}")
+            try:
+                (_gif if path.suffix == ".gif" else _mp4)(pictures, part, fps)
+                part.replace(path)
+            finally:
+                part.unlink(missing_ok=True)
+            return [path]
         return [_png(picture, _numbered(path, i)) for i, picture in enumerate(pictures)]
     except OSError as error:
         raise UserError(f"{path}: cannot be written ({(error.strerror or str(error)).lower()})") from None

@@ -7,7 +7,6 @@ import io
 import json
 import os
 import threading
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -29,6 +28,8 @@ class StateFile:
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / NAME
+        for part in folder.glob(f".{NAME}.*"):  # of a run that was killed
+            part.unlink(missing_ok=True)
         self.saved = self.errors = 0
         self.error = ""
         self._writing: threading.Thread | None = None
@@ -75,9 +76,14 @@ def load_state(folder: Path, tracker: Tracker) -> tuple[TrackerState, tuple[int,
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
             arrays: dict[str, NDArray[np.generic]] = {name: file[name] for name in file.files}
         about = json.loads(str(arrays.pop("about")))
-        segment, offset = about["place"]
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, json.JSONDecodeError):
+        segment, offset = (int(number) for number in about["place"])
+        if min(segment, offset) < 0:
+            raise ValueError(about["place"])
+    except Exception:  # whatever an archive reader stumbles over in bytes that are not an archive's
         raise UserError(
             f"{path}: the saved state is damaged; remove it, and the log is replayed from its beginning"
         ) from None
-    return state_of_arrays(arrays, tracker), (int(segment), int(offset)), about
+    try:
+        return state_of_arrays(arrays, tracker), (segment, offset), about
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None

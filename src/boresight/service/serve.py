@@ -418,8 +418,11 @@ def _restored(parts: Parts, log: LogWriter, status: TextIO | None) -> TrackState
     if saved is not None:
         tracker, place, about = saved
         state = TrackState(tracker, parts.tracking.pipeline.init())
-        parts.decoder.restore(about["decoder"])
-        parts.poses.restore(about["poses"])
+        try:
+            parts.decoder.restore(about["decoder"])
+            parts.poses.restore(about["poses"])
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError):
+            raise UserError(f"{log.folder}: the saved state is damaged; remove its state.npz") from None
     reader = LogReader(log.folder, place)
     source = LogSource(reader, [parts.decoder] * 64)
     for items in source:

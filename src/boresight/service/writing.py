@@ -8,7 +8,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from boresight.errors import UserError
-from boresight.io.livelog import LogTable, LogWriter, create_log, is_log
+from boresight.io.files import holds_others
+from boresight.io.livelog import (
+    MARKER,
+    SETTINGS,
+    SITE,
+    LogTable,
+    LogWriter,
+    create_log,
+    is_log,
+    segment_name,
+    segments_of,
+)
+from boresight.service.restart import NAME
 from boresight.service.sockets import Input
 
 
@@ -20,6 +32,10 @@ def new_log(folder: Path, site: str, settings: str, force: bool, about: LogTable
             raise UserError(f"{folder}: holds something else than a log; choose another folder")
         if inside and not force:
             raise UserError(f"{folder}: the log exists; give --force to replace it, or another folder")
+        ours = {MARKER, SITE, SETTINGS, NAME, *map(segment_name, segments_of(folder))}
+        others = sorted(p.name for p in folder.iterdir() if p.name not in ours and not p.name.startswith(f".{NAME}."))
+        if others:
+            raise UserError(f"{folder}: {holds_others(others)}")
         shutil.rmtree(folder)
     return create_log(folder, site, settings, about)
 

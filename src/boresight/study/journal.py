@@ -57,9 +57,12 @@ class Journal:
         self._write(row)
 
     def _write(self, row: dict[str, Any]) -> None:
-        self._file.write(json.dumps(row).encode() + b"\n")
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        try:
+            self._file.write(json.dumps(row).encode() + b"\n")
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise UserError(f"{self.path}: cannot be written ({reason(error)}); the runs before are kept") from None
 
     def __enter__(self) -> Journal:
         return self

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from boresight.errors import UserError
 from boresight.kernels.tracker import Tracks
-from boresight.kernels.tracker_copies import EACH, WHOLE, Copies, each_of
+from boresight.kernels.tracker_copies import EACH, WHOLE, Copies
 from boresight.kernels.tracker_looks import Looks
 from boresight.kernels.tracker_rows import Clock
 from boresight.kernels.tracker_window import Fates
 from boresight.tracking.core import copy_tracks
 from boresight.tracking.names import Names
+from boresight.tracking.saved_check import check_arrays
 from boresight.tracking.tracker import Tracker, TrackerState
 from boresight.tracking.window import Window, held
 
@@ -62,14 +63,13 @@ def arrays_of_state(state: TrackerState) -> Arrays:
 def state_of_arrays(arrays: Mapping[str, NDArray[np.generic]], tracker: Tracker) -> TrackerState:
     """Return the state that `arrays_of_state` took apart, for the same tracker.
 
-    Raises UserError where the arrays are of another version or do not fit the tracker's sensors and settings.
+    Raises UserError where the arrays are of another version, damaged (`saved_check`), or do not fit the tracker.
     """
-    if "format" not in arrays or int(arrays["format"][0]) != FORMAT:
+    if "format" not in arrays or not np.array_equal(arrays["format"], [FORMAT]):
         raise UserError(f"saved tracker state: not of format {FORMAT}; save it again with this version")
-    shape = {f"tracks.{name}": getattr(tracker.plan.empty, name).shape[1:] for name in each_of(tracker.plan.empty)}
-    saved = {f"tracks.{name}": arrays[f"tracks.{name}"].shape[1:] for name in EACH if f"tracks.{name}" in arrays}
-    if saved != shape or len(arrays["tracks.last_look"]) != len(tracker.sensors):
-        raise UserError("saved tracker state: made with other sensors or settings; use the same recording and --config")
+    arrays = {name: np.asarray(array) for name, array in arrays.items()}
+    lag = tracker.config.smoothing_lag
+    check_arrays(arrays, tracker.plan.empty, tracker.length, np.inf if lag is None else None)
     tracks = Tracks(**_parts(arrays, "tracks"))
     window = Window(
         copy_tracks(tracks, max(64, 2 * len(tracks.birth))),

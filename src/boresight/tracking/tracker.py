@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from boresight.errors import UserError
 from boresight.frames.pose import PoseTrack, add_navigation_noise, has_pose, sensor_poses
 from boresight.kernels.tracker_looks import NO_LOOK, Looks, moment, places_of_looks
 from boresight.kernels.tracker_rows import ARRIVAL, PENDING, RowTable, row_table, rows_at_arrival, times_due
@@ -17,8 +18,9 @@ from boresight.tracking.core import Plan, make_plan
 from boresight.tracking.lagged import smoothed_rows
 from boresight.tracking.names import Names
 from boresight.tracking.output import Decisions, Rows, decisions_of, rows_of, unseen
+from boresight.tracking.scan_check import LATEST, check_detections, check_scans, check_setup
 from boresight.tracking.window import Window, empty_window, take, what_became
-from boresight.types import NO_TRACK, Fate, FloatArray, Reporting, Scan, Sensor, addresses_of
+from boresight.types import NO_TRACK, Component, Fate, FloatArray, Reporting, Scan, Sensor, addresses_of
 
 REASON = {
     Fate.UNASSOCIATED: "no track took it, and it begins none",
@@ -76,6 +78,7 @@ class Tracker:
     _period: FloatArray = field(init=False)  # (S,) s, declared; NaN: to be found out; 0: not used
 
     def __post_init__(self) -> None:
+        check_setup(self.config, self.sensors, self.dimensions, self.poses, self.use, self.site_height)
         used = self.used
         plan = make_plan(self.config, self.sensors, self.dimensions, used, self.site_height)
         object.__setattr__(self, "plan", plan)
@@ -120,9 +123,14 @@ class Tracker:
         return self.steps(state, (scan,))
 
     def steps(self, state: TrackerState, scans: Sequence[Scan]) -> tuple[TrackerState, Output]:
-        """Take several looks in order of arrival at once: what `step` does one by one, and faster."""
-        if not scans:
+        """Take several looks in order of arrival at once: what `step` does one by one, and faster.
+
+        Raises UserError, with nothing changed, for looks that cannot be, and a state of another tracker.
+        """
+        if not len(scans):
             return state, Output([], [], [])
+        self._require(state)
+        check_scans(scans, len(self.sensors), state.arrival)
         lag = self.config.smoothing_lag
         if lag is not None and len(scans) > 1:  # smoothed rows depend on what was known when
             out = Output([], [], [])
@@ -142,7 +150,27 @@ class Tracker:
 
     def tick(self, state: TrackerState, t_recv: float) -> Output:
         """Give the rows due by `t_recv` (s) although no look comes in: a stage before the tracker may hold looks."""
+        self._require(state)
+        if not abs(t_recv) < LATEST:
+            raise UserError(f"tracker: t_recv must be a time in seconds, not {t_recv!r}")
         return self._take(state, moment(t_recv))
+
+    def _require(self, state: TrackerState) -> None:
+        """Raise UserError for a state that is not of this tracker."""
+        if not isinstance(state, TrackerState):
+            raise UserError(f"tracker: the state must be what init or step gave, not {type(state).__name__}")
+        tracks, like = state.window.tracks, self.plan.empty
+        same = (
+            tracks.x.shape[1] == self.plan.n_states
+            and tracks.last_look.shape == like.last_look.shape[1:]
+            and tracks.told.shape[1:] == like.told.shape[1:]
+            and tracks.witness.shape[1:] == like.witness.shape[1:]
+            and tracks.spoken.shape[1:] == like.spoken.shape[1:]
+            and (tracks.mode is None) == (like.mode is None)
+            and (like.mode is None or tracks.mode_x.shape[1:] == like.mode_x.shape[1:])
+        )
+        if not same:
+            raise UserError("tracker: the state is that of a tracker with other sensors or settings")
 
     def due(self, state: TrackerState, t: float) -> Output:
         """Give the rows due by time `t` (s), nothing having arrived since: what comes later is the same without."""
@@ -192,7 +220,10 @@ class Tracker:
         state.smoothed = max(state.smoothed, until)
 
     def looks(self, scans: Sequence[Scan]) -> Looks:
-        """Return looks as the kernel takes them: the declared latencies taken off, the sensors placed."""
+        """Return looks as the kernel takes them: the declared latencies taken off, the sensors placed.
+
+        Raises UserError for detections that cannot be.
+        """
         count = np.array([len(scan.t) for scan in scans])
         first = np.concatenate([[0], np.cumsum(count)])
         sensor = np.array([scan.sensor for scan in scans])
@@ -214,6 +245,8 @@ class Tracker:
             velocity=np.zeros((len(t) + len(scans), 3)),
             axes=np.zeros((len(t) + len(scans), 3, 3)),
         )
+        sigma_range = np.array([s.sigma[Component.RANGE] for s in self.sensors])[sensor]
+        check_detections(np.repeat(sensor, count), t, looks.z, looks.R, np.repeat(sigma_range, count))
         for i in np.unique(sensor):
             self._place(looks, np.flatnonzero(sensor == i), t)
         return looks
