@@ -39,8 +39,6 @@ STATES: dict[str, tuple[Any, Any, Any]] = {
     "inf in P": (0.0, X, _with((1, 1), np.inf)),
     "NaN in x": (0.0, np.full(6, np.nan), P),
     "inf in x": (0.0, np.full(6, np.inf), P),
-    "float32": (0.0, X.astype(np.float32), P),
-    "integers": (0.0, X.astype(int), P),
     "text": (0.0, np.array(["a"] * 6), P),
     "nothing": (0.0, None, None),
     "two-dimensional": (0.0, X[None], P),

@@ -401,8 +401,7 @@ def test_a_first_range_rate_tells_of_the_velocity_along_the_line_of_sight() -> N
     used = Tracker(TrackerConfig(), (doppler,), 2)
     z, R = np.full((1, 7), np.nan), np.full((1, 7, 7), np.nan)
     z[0, :2], z[0, 3] = (500.0, np.arctan2(3.0, 4.0)), -6.0
-    for a, b in ((0, 0), (1, 1), (3, 3)):
-        R[0, a, b] = sigma[a] ** 2
+    R[0][np.ix_([0, 1, 3], [0, 1, 3])] = np.diag(sigma[[0, 1, 3]] ** 2)
     state, _ = used.step(used.init(), Scan(0, 0.0, 0.0, np.zeros(1), z, R, np.arange(1)))
     u, gain = np.array([0.6, 0.8]), 64.0 / (64.0 + 4.0)  # prior speed 8 m/s
     tr = state.window.tracks

@@ -25,14 +25,14 @@ def spatial(dimensions: int) -> None:
 
 
 def state(name: str, t: Any, x: Any, P: Any, size: int | None = None) -> None:
-    """Raise UserError unless (t, x, P) is a Gaussian belief: arrays of float64, finite, `P` a covariance.
+    """Raise UserError unless (t, x, P) is a Gaussian belief: arrays of finite numbers, `P` a covariance.
 
     `size` is the length that `x` must have; a variance may be zero.
     """
     for what, value in (("x", x), ("P", P)):
-        if not isinstance(value, np.ndarray) or value.dtype != np.float64:
+        if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiu":
             kind = f"an array of {value.dtype}" if isinstance(value, np.ndarray) else type(value).__name__
-            raise UserError(f"{name}: {what} must be an array of float64, not {kind}")
+            raise UserError(f"{name}: {what} must be an array of real numbers, not {kind}")
     n = len(x) if size is None and x.ndim else size
     if x.shape != (n,) or P.shape != (n, n):
         raise UserError(f"{name}: x must have the shape ({n},) and P ({n}, {n}), not {x.shape} and {P.shape}")
