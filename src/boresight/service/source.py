@@ -20,7 +20,7 @@ from boresight.io.livelog import Kind, LogReader, LogWriter
 from boresight.service.sockets import Input, lines_in
 
 POLL = 0.005  # s between looks at inputs that cannot be waited for
-GATHER = 0.004  # s for which what arrives is gathered into one step
+GATHER = 0.002  # s for which what arrives is gathered into one step
 MOST_LINES, MOST_BYTES = 50_000, 64 << 20  # that wait
 MOST_WAIT = 1.0  # s that raw data may wait
 PER_STEP, STEP_BYTES = 400, 1 << 17  # lines, bytes taken in one step: so long are sockets and ticks left alone
